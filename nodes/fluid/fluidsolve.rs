@@ -184,6 +184,12 @@ metrics! { METRICS:
             `volume_correction` the surface moves by up to a tenth of a cell in a frame to make it good, where there is room: drops and \
             thin films take several frames, and where a box is full or colliders enclose the liquid, it stays off. Without \
             `volume_correction` it stays off, too.");
+    VOLUME_BALANCE = Metric::new("volume_balance", Unit::None,
+        "`volume`, `spray`, `sunk` and `left_domain` together, relative to what there was at the start and `sourced`: 0 where all \
+            of it is somewhere.")
+        .warn_outside(-0.01, 0.01, "What is there, with what went, is off by {volume_balance} of all that there was and that came: \
+            {volume} m³ of liquid, {spray} of spray, {sunk} sunk, {left_domain} left, {sourced} sourced. Raise `resolution`, or lower \
+            `cell` where colliders or sheets of liquid are thinner than two cells.");
     SPRAY = Metric::new("spray", Unit::CubicMetres,
         "Volume of drops too small for the grid, which fly on their own as `spray` in `particles`.");
     EULER_CHARACTERISTIC = Metric::new("euler_characteristic", Unit::None,

@@ -10,9 +10,8 @@ use super::{
     SUBSTEPS_USED, VISCOSITY_ITERATIONS, VISCOSITY_RESIDUAL,
 };
 
-/// The metrics of a frame that the solver alone determines.
-pub(super) fn measured(report: &LiquidReport) -> MetricValues {
-    let mut metrics = MetricValues::default();
+/// Sets the metrics of a frame that the solver alone determines.
+pub(super) fn measured(metrics: &mut MetricValues, report: &LiquidReport) {
     metrics.set(SUBSTEPS_USED, report.substeps);
     metrics.set(CFL_REACHED, report.cfl_reached);
     metrics.set(CAPS_HIT, report.caps_hit + report.solves_cut_short);
@@ -29,7 +28,6 @@ pub(super) fn measured(report: &LiquidReport) -> MetricValues {
     for (metric, force) in [COLLIDER_FORCE_X, COLLIDER_FORCE_Y, COLLIDER_FORCE_Z].into_iter().zip(report.solid_force) {
         metrics.set(metric, force);
     }
-    metrics
 }
 
 /// Where liquid is, in solver cells.

@@ -63,7 +63,7 @@ pub(super) fn particles(cx: &Cx, run: &Run, lattice: Lattice, volume: &Volume) -
     }
     if cx.wants(PARTICLE_VOLUME) {
         let mut volumes = vec![0.0; on_surface];
-        volumes.extend(run.spray.iter().map(|drop| drop.volume));
+        volumes.extend(run.spray.iter().map(|drop| drop.volume as f32));
         volumes.resize(count, 0.0);
         particles.set(PARTICLE_VOLUME, volumes)?;
     }

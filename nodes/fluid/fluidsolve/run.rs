@@ -10,7 +10,7 @@ use liquid::step::{
     Liquid, LiquidReport, LiquidSettings, LiquidSink, LiquidSource, Motion, Solid, Surface, Surroundings,
 };
 use liquid::velocity::Sampler;
-use liquid::volumes::VolumeTargets;
+use liquid::volumes::{LostPiece, VolumeReport, VolumeTargets, cap};
 use numerics::vector::{add, cross, scale, sub};
 use serde::{Deserialize, Serialize};
 
@@ -20,12 +20,12 @@ use super::measured::{euler_characteristic, measured, pool_of};
 use super::openings::{Opening, SINK, SOURCE, Timed};
 use super::particles::{materials_at, particles};
 use super::shapes::{Colliders, in_cells, liquid_at_start};
-use super::spray::{Air, SprayDrop};
+use super::spray::{Air, SprayDrop, gathered, rejoining};
 use super::{
     CFL_REACHED, COLLECTING, DENSITY, EULER_CHARACTERISTIC, FAST_SHAPES, IN_COLLIDERS, INITIAL_SPIN, INITIAL_VELOCITY,
     LEFT_DOMAIN, LIQUID_CELLS, MADE_GOOD, MADE_GOOD_NOW, MISWIRED, OUTSIDE, PARTICLES, PARTICLES_NOW, SINKS, SOURCED,
-    SOURCES, SPRAY, SUNK, SURFACE, TRACERS, TRACERS_OUTSIDE, UNSEEN, VOLUME, VOLUME_CORRECTION, VOLUME_DRIFT,
-    VOLUME_DRIFT_RAW, VOLUME_NOW, WITHHELD, WITHHELD_WIRE,
+    SOURCES, SPRAY, SUNK, SURFACE, TRACERS, TRACERS_OUTSIDE, UNSEEN, VOLUME, VOLUME_BALANCE, VOLUME_CORRECTION,
+    VOLUME_DRIFT, VOLUME_DRIFT_RAW, VOLUME_NOW, WITHHELD, WITHHELD_WIRE,
 };
 use crate::shared::attributes::{SINK_RATE, SOURCE_RATE};
 use crate::shared::surface::{SurfaceDetail, surface};
@@ -35,11 +35,16 @@ use crate::shared::volume::volume;
 /// allows it so much.
 const LEAST_MOVED: f64 = 2.0;
 
+/// Share of all volume that sums of it may be off by.
+const ROUNDING: f64 = 1e-9;
+
 /// The state of the simulation.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Run {
     pub(super) surface: MarkedSurface,
     pub(super) motion: Motion,
+    /// What there was at the start, m³.
+    started: f64,
     /// Since the start, m³: what sources gave, what sinks took, what left through open walls.
     sourced: f64,
     sunk: f64,
@@ -115,6 +120,7 @@ impl Chain for Run {
         let mut run = Self {
             surface,
             motion,
+            started: targets.volume(),
             sourced: 0.0,
             sunk: 0.0,
             left_domain: 0.0,
@@ -139,24 +145,18 @@ impl Chain for Run {
         let colliders = Colliders::within_step(cx, self.colliders.take(), &settings.domain, lattice)?;
         let passed = |frame: Frame| cx.integrals::<2>(frame)[1][1];
         let seconds = passed(cx.frame()) - passed(cx.previous());
-        self.volume = OnceLock::new();
+        (self.volume, self.metrics) = (OnceLock::new(), MetricValues::default());
         let (report, fast_openings) = match seconds > 0.0 {
             true => self.advance(cx, settings, &colliders, seconds)?,
             false => (LiquidReport { liquid_cells: self.motion.liquid_cells(), ..LiquidReport::default() }, 0),
         };
-        self.sourced += report.sourced;
-        self.sunk += report.sunk;
-        self.left_domain += report.left_domain;
-        self.metrics = measured(&report);
-        self.correct(cx, &report, &colliders);
-        self.metrics.set(SOURCED, self.sourced);
-        self.metrics.set(SUNK, self.sunk);
+        measured(&mut self.metrics, &report);
+        self.balance(&report);
         let has_moved = report.substeps > 0;
         self.metrics.set(WITHHELD, if has_moved { self.withheld } else { 0.0 });
         self.metrics.set(WITHHELD_WIRE, self.withheld_wire as f64);
         self.metrics.set(COLLECTING, if has_moved { self.collecting as f64 } else { 0.0 });
         self.metrics.set(MISWIRED, miswired(cx) as f64);
-        self.metrics.set(LEFT_DOMAIN, self.left_domain);
         self.metrics.set(FAST_SHAPES, (colliders.fast() + fast_openings) as f64);
         self.colliders = Some(colliders);
         Ok(())
@@ -212,7 +212,7 @@ impl Run {
             sinks: &sinks,
             cancelled: &|| cx.check_cancelled().is_err(),
         };
-        let mut liquid = Liquid::resume(settings, self.surface.clone(), std::mem::take(&mut self.motion));
+        let mut liquid = Liquid::resume(settings.clone(), self.surface.clone(), std::mem::take(&mut self.motion));
         if has_material && liquid.motion().materials().is_none() {
             liquid.set_materials(|_| LiquidMaterial::default());
         }
@@ -237,34 +237,89 @@ impl Run {
         let air = Air { gravity: params(0.5 * seconds)[0], seconds, cell: lattice.cell, domain: &domain, colliders };
         self.spray.retain_mut(|drop| {
             let stays = drop.fly(&air);
-            self.left_domain += if stays { 0.0 } else { f64::from(drop.volume) };
+            self.left_domain += if stays { 0.0 } else { drop.volume };
             stays
         });
         (self.surface, self.motion) = liquid.into_parts();
+        for drop in rejoining(&mut self.spray, &self.surface, lattice.cell) {
+            self.targets.add(drop.volume, Some(drop.place));
+        }
+        self.correct(cx, settings, &report, &air);
         Ok((report, fast))
     }
 
-    /// Brings each piece of liquid to the volume that it should have, and makes spray of those that the grid lost.
-    fn correct(&mut self, cx: &StepCx, report: &LiquidReport, colliders: &Colliders) {
-        if report.substeps == 0 {
-            return;
-        }
-        let solid = |point: [f32; 3]| colliders.distance(1.0, point);
+    /// Brings each piece of liquid to the volume that it should have, and makes spray of those that the grid lost, and liquid
+    /// of spray that it can show.
+    fn correct(&mut self, cx: &StepCx, settings: LiquidSettings, report: &LiquidReport, air: &Air<'_>) {
+        let distance = |point: [f32; 3]| air.colliders.distance(1.0, point);
+        let solid = air.colliders.solid(&distance);
         let corrected = match cx.get(VOLUME_CORRECTION) {
-            true => self.targets.correct(&mut self.surface, colliders.solid(&solid)),
-            false => self.targets.measure(&mut self.surface, colliders.solid(&solid)),
+            true => {
+                let way = report.cfl_reached * f64::from(report.substeps);
+                self.targets.correct_within(&mut self.surface, solid, cap(way))
+            }
+            false => self.targets.measure(&mut self.surface, solid),
         };
-        let mut sampler = Sampler::new(self.motion.rows());
-        let places: Vec<[f32; 3]> = corrected.lost.iter().map(|piece| piece.place).collect();
-        for (piece, material) in corrected.lost.iter().zip(materials_at(&self.motion, &places)) {
-            let velocity = self.motion.velocity().at(&mut sampler, piece.place);
-            self.spray.push(SprayDrop { place: piece.place, velocity, volume: piece.volume as f32, material });
-        }
-        self.metrics.set(VOLUME_DRIFT_RAW, corrected.raw_drift);
-        self.metrics.set(VOLUME_DRIFT, corrected.drift);
         self.metrics.set(MADE_GOOD, percent(corrected.corrected, corrected.target));
         self.metrics.set(MADE_GOOD_NOW, percent(corrected.corrected_now, corrected.target));
-        self.metrics.set(SPRAY, self.spray.iter().fold(0.0, |sum, drop| sum + f64::from(drop.volume)));
+        self.spray(&corrected.lost, air);
+        let now = self.gather(settings, air).unwrap_or(corrected);
+        let waiting = self.targets.take_waiting();
+        self.spray(&waiting, air);
+        self.metrics.set(VOLUME_DRIFT_RAW, now.raw_drift);
+        self.metrics.set(VOLUME_DRIFT, now.drift);
+    }
+
+    /// Makes drops of liquid that the grid does not show.
+    fn spray(&mut self, pieces: &[LostPiece], air: &Air<'_>) {
+        let mut sampler = Sampler::new(self.motion.rows());
+        let places: Vec<[f32; 3]> = pieces.iter().map(|piece| piece.place).collect();
+        for (piece, material) in pieces.iter().zip(materials_at(&self.motion, &places)) {
+            let velocity = self.motion.velocity().at(&mut sampler, piece.place);
+            let mut drop = SprayDrop { place: piece.place, velocity, volume: piece.volume, material };
+            drop.put_outside(air);
+            self.spray.push(drop);
+        }
+    }
+
+    /// Makes liquid of drops that hold enough for the grid to show; what is measured then, if there are any.
+    fn gather(&mut self, settings: LiquidSettings, air: &Air<'_>) -> Option<VolumeReport> {
+        let balls = gathered(&mut self.spray, air);
+        if balls.is_empty() {
+            return None;
+        }
+        let distance = |_: f64, point: [f32; 3]| air.colliders.distance(1.0, point);
+        let solid = (!air.colliders.is_empty()).then(|| Solid::still(&distance));
+        let mut liquid = Liquid::resume(settings, self.surface.clone(), std::mem::take(&mut self.motion));
+        for (ball, volume) in balls {
+            liquid.add_ball(&ball, solid, 0.0);
+            self.targets.add(volume, Some(ball.place));
+        }
+        (self.surface, self.motion) = liquid.into_parts();
+        let at_end = |point: [f32; 3]| air.colliders.distance(1.0, point);
+        let now = self.targets.measure(&mut self.surface, air.colliders.solid(&at_end));
+        self.spray(&now.lost, air);
+        Some(now)
+    }
+
+    /// Settles what sinks and open walls took beyond what there was, and sets what is measured of the accounts.
+    fn balance(&mut self, report: &LiquidReport) {
+        let owed = self.targets.forgive();
+        let from_sinks = owed.min(report.sunk);
+        self.sunk += report.sunk - from_sinks;
+        self.left_domain += report.left_domain - (owed - from_sinks);
+        self.sourced += report.sourced;
+        let spray = self.spray.iter().fold(0.0, |sum, drop| sum + drop.volume);
+        let (came, went) = (self.started + self.sourced, self.sunk + self.left_domain);
+        // What pieces should hold is exact; what they do hold follows.
+        let owned = self.targets.target() + self.targets.waiting() + spray;
+        debug_assert!((owned + went - came).abs() <= ROUNDING * came.max(went), "{owned} m³, {came} came, {went} went");
+        let error = self.targets.volume() + spray + went - came;
+        self.metrics.set(VOLUME_BALANCE, if came > 0.0 { error / came } else { 0.0 });
+        self.metrics.set(SPRAY, spray);
+        self.metrics.set(SOURCED, self.sourced);
+        self.metrics.set(SUNK, self.sunk);
+        self.metrics.set(LEFT_DOMAIN, self.left_domain);
     }
 
     /// The output's volume: the level set without what lies inside colliders, and the velocity.

@@ -1,7 +1,11 @@
-//! Drops too small for the grid.
+//! Drops too small for the grid, and their way back into the liquid.
 
-use liquid::level_set::outward;
-use liquid::step::{Domain, Wall};
+use std::f64::consts::PI;
+
+use liquid::carried::LiquidMaterial;
+use liquid::level_set::{PhiSampler, outward};
+use liquid::marked::MarkedSurface;
+use liquid::step::{Domain, LiquidBall, Wall};
 use numerics::vector::{add, length, lerp, scale, sub};
 use serde::{Deserialize, Serialize};
 
@@ -11,8 +15,15 @@ use super::shapes::Colliders;
 const STEPS_IN_CELL: f32 = 8.0;
 const MOST_STEPS: f32 = 1024.0;
 
-/// A drop too small for the grid. It flies on its own, stays where it hits a collider or a wall, and does not come back into
-/// the liquid.
+/// Volume, in solver cells, from which drops at one place are liquid again: the grid shows a ball of it, and keeps it.
+const SHOWN: f64 = 8.0;
+/// Distance, in solver cells, up to which drops are at one place.
+const TOGETHER: f32 = 2.0;
+/// Distance, in solver cells, from the surface up to which a drop touches it, however small it is.
+const TOUCH: f32 = 0.5;
+
+/// A drop too small for the grid. It flies on its own, stays where it hits a collider or a wall, and is liquid again where it
+/// meets the liquid, or enough others.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct SprayDrop {
     /// Where it is, in solver cells.
@@ -20,7 +31,7 @@ pub(super) struct SprayDrop {
     /// m/s.
     pub(super) velocity: [f32; 3],
     /// m³.
-    pub(super) volume: f32,
+    pub(super) volume: f64,
     /// Viscosity, Pa·s, and density, kg/m³, where they are not the solver's.
     pub(super) material: [Option<f32>; 2],
 }
@@ -49,6 +60,41 @@ impl SprayDrop {
         }
         self.meet_colliders(from, air);
         self.meet_walls(air.domain)
+    }
+
+    /// Moves out of walls and colliders, where it is to start.
+    pub(super) fn put_outside(&mut self, air: &Air<'_>) {
+        let depth = -air.colliders.distance(1.0, self.place);
+        if depth > 0.0
+            && let Some(out) = outward(&|at| air.colliders.distance(1.0, at), self.place)
+        {
+            self.place = add(self.place, scale(out, depth));
+        }
+        let [low, high] = air.domain.bounds();
+        for axis in 0..3 {
+            let [below, above] = air.domain.walls[axis].map(Wall::is_solid);
+            let at = &mut self.place[axis];
+            *at = if below { at.max(low[axis]) } else { *at };
+            *at = if above { at.min(high[axis]) } else { *at };
+        }
+    }
+
+    /// Its radius, in cells of this side, m.
+    fn radius(&self, cell: f64) -> f32 {
+        radius(self.volume / (cell * cell * cell))
+    }
+
+    /// The ball that it is as liquid, if there is room for its centre.
+    fn ball(&self, air: &Air<'_>) -> Option<LiquidBall> {
+        let [viscosity, density] = self.material;
+        let ball = LiquidBall {
+            place: self.place,
+            radius: self.radius(air.cell),
+            velocity: self.velocity,
+            material: LiquidMaterial { viscosity, density },
+        };
+        let distance = |at: [f32; 3]| air.colliders.distance(1.0, at);
+        ball.beside(air.domain, &distance, |at| outward(&distance, at))
     }
 
     /// Stays on the first collider on its way, and moves with it.
@@ -95,6 +141,57 @@ impl SprayDrop {
     }
 }
 
+/// The radius of a ball of that volume.
+fn radius(volume: f64) -> f32 {
+    libm::cbrt(0.75 / PI * volume) as f32
+}
+
+/// Takes out the drops that are in the liquid or touch it. `cell`: the side of a solver cell, m.
+pub(super) fn rejoining(spray: &mut Vec<SprayDrop>, surface: &MarkedSurface, cell: f64) -> Vec<SprayDrop> {
+    let (size, mut sampler) = (surface.resolution() as f32, PhiSampler::new(surface.level_set().view()));
+    let joins = |drop: &mut SprayDrop| {
+        let near = drop.radius(cell).max(TOUCH);
+        sampler.at(scale(drop.place, size)) < near * size
+    };
+    spray.extract_if(.., joins).collect()
+}
+
+/// Takes out the drops that together hold enough for the grid to show, as balls of liquid with their volumes, m³.
+pub(super) fn gathered(spray: &mut Vec<SprayDrop>, air: &Air<'_>) -> Vec<(LiquidBall, f64)> {
+    let enough = SHOWN * air.cell * air.cell * air.cell;
+    let mut largest: Vec<usize> = (0..spray.len()).collect();
+    largest.sort_by(|a, b| spray[*b].volume.total_cmp(&spray[*a].volume));
+    let (mut is_taken, mut balls) = (vec![false; spray.len()], Vec::new());
+    for first in largest {
+        if is_taken[first] {
+            continue;
+        }
+        let reach = TOGETHER.max(spray[first].radius(air.cell));
+        let near = |n: &usize| !is_taken[*n] && length(sub(spray[*n].place, spray[first].place)) <= reach;
+        let own: Vec<usize> = (0..spray.len()).filter(near).collect();
+        let together = sum(own.iter().map(|n| &spray[*n]), &spray[first]);
+        if together.volume < enough {
+            continue;
+        }
+        if let Some(ball) = together.ball(air) {
+            own.iter().for_each(|n| is_taken[*n] = true);
+            balls.push((ball, together.volume));
+        }
+    }
+    let mut taken = is_taken.into_iter();
+    spray.retain(|_| !taken.next().unwrap_or_default());
+    balls
+}
+
+/// One drop of several: at the centre of their mass, with their momentum, of what the first is made of.
+fn sum<'a>(drops: impl Iterator<Item = &'a SprayDrop> + Clone, first: &SprayDrop) -> SprayDrop {
+    let volume = drops.clone().fold(0.0, |sum, drop| sum + drop.volume);
+    let mean = |of: &dyn Fn(&SprayDrop) -> [f32; 3]| {
+        drops.clone().fold([0.0; 3], |sum, drop| add(sum, scale(of(drop), (drop.volume / volume) as f32)))
+    };
+    SprayDrop { place: mean(&|drop| drop.place), velocity: mean(&|drop| drop.velocity), volume, ..*first }
+}
+
 #[cfg(test)]
 mod tests {
     use engine::prelude::*;
@@ -138,6 +235,44 @@ mod tests {
             assert!((end.place[1] - 10.5).abs() < 0.5, "{speed}: {end:?}");
             assert!(end.velocity[1].abs() < 1.01, "{speed}: {end:?}");
         }
+    }
+
+    #[test]
+    fn drops_that_hold_enough_together_are_liquid_again() {
+        // A cell of 0.1 m: 1e-3 m³.
+        let (domain, colliders) = (Domain::closed([0; 3], [20; 3]), Colliders::default());
+        let air = Air { gravity: [0.0; 3], seconds: 0.1, cell: 0.1, domain: &domain, colliders: &colliders };
+        let of = |x: f32, volume: f64, velocity| SprayDrop { volume, ..drop([x, 0.0, 5.0], velocity) };
+        let slow = of(14.0, 5e-3, [0.0; 3]);
+        let mut spray = vec![of(4.0, 3e-3, [1.0, 0.0, 0.0]), slow, of(5.0, 6e-3, [4.0, 0.0, 0.0])];
+        let balls = gathered(&mut spray, &air);
+        let [(ball, volume)] = &balls[..] else { panic!("{balls:?}") };
+        assert!((volume - 9e-3).abs() < 1e-12 && spray == [slow]);
+        // On the floor, where it has room.
+        let expected = [4.0 + 2.0 / 3.0, ball.radius, 5.0];
+        assert!(length(sub(ball.place, expected)) < 1e-5 && (ball.velocity[0] - 3.0).abs() < 1e-5, "{ball:?}");
+        assert!((4.0 / 3.0 * PI * f64::from(ball.radius).powi(3) - 9.0).abs() < 1e-4);
+        assert!(gathered(&mut spray, &air).is_empty() && spray.len() == 1);
+    }
+
+    #[test]
+    fn drops_in_the_liquid_or_at_its_surface_join_it() {
+        for resolution in [1, 3] {
+            let surface = MarkedSurface::new(Domain::closed([0; 3], [10; 3]), resolution, |p| p[1] - 5.0, 0, 1);
+            let at = |y: f32| drop([5.0, y, 5.0], [0.0; 3]);
+            let mut spray = vec![at(0.0), at(4.0), at(5.3), at(5.8), at(9.0)];
+            assert_eq!(rejoining(&mut spray, &surface, 0.1), [at(0.0), at(4.0), at(5.3)]);
+            assert_eq!(spray, [at(5.8), at(9.0)]);
+        }
+    }
+
+    #[test]
+    fn it_starts_outside_of_walls() {
+        let (domain, colliders) = (Domain::closed([0; 3], [20; 3]), Colliders::default());
+        let air = Air { gravity: [0.0; 3], seconds: 0.1, cell: 0.1, domain: &domain, colliders: &colliders };
+        let mut below = drop([5.0, -0.3, 21.0], [0.0; 3]);
+        below.put_outside(&air);
+        assert_eq!(below.place, [5.0, 0.0, 20.0]);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use numerics::shapes::{self, Polygons};
 use numerics::vector::add;
 use std::sync::Arc;
 
+mod balance;
 mod carried;
 mod said;
 

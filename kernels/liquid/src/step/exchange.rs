@@ -170,7 +170,7 @@ impl<'a> Exchange<'a> {
                 let [low, high] = cells.bounds();
                 surface.change(low, high, &cells.emptied());
                 let left = cells.volume(&cells.level_set(&surface.view()));
-                account.moved += (cells.volume(&phi) - left) * self.cell_volume();
+                account.cut((cells.volume(&phi) - left) * self.cell_volume());
             }
             return None;
         }

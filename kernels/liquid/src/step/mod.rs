@@ -28,6 +28,7 @@
 //!
 //! Time and memory follow the liquid, not the domain: the cells that are stored are chosen anew each substep.
 
+mod balls;
 mod domain;
 mod exchange;
 mod force;
@@ -45,6 +46,7 @@ mod substep;
 mod tests;
 mod turned;
 
+pub use balls::LiquidBall;
 pub use domain::{Domain, Solid, Wall};
 pub use motion::Motion;
 pub use outflow::Outflow;

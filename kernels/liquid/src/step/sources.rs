@@ -87,6 +87,8 @@ pub struct FlowAccount {
     pub(super) owed: f64,
     /// What passes as divergence of its liquid, m³/s.
     pub(super) pouring: f64,
+    /// What cuts of the surface have added instead of taking it, and those to come have to take first, m³.
+    pub(super) gained: f64,
 }
 
 /// Share of the rate by which more or less pours while too much or too little is owed: what a short substep gives must not
@@ -102,6 +104,14 @@ impl FlowAccount {
     pub(super) fn start_frame(accounts: &mut Vec<Self>, count: usize) {
         accounts.resize(count, Self::default());
         accounts.iter_mut().for_each(|account| (account.moved, account.asked, account.withheld) = (0.0, 0.0, 0.0));
+    }
+
+    /// Counts what a cut of the surface took. One that only makes the surface anew may add a little; what is counted never
+    /// goes back.
+    pub(super) fn cut(&mut self, volume: f64) {
+        let taken = volume - self.gained;
+        self.gained = (-taken).max(0.0);
+        self.moved += taken.max(0.0);
     }
 
     /// Counts what poured in a substep; returns the rate that it poured at, m³/s.

@@ -6,8 +6,8 @@
 //! that got too small for the grid is lost, with its target, to whoever carries it on.
 //!
 //! Promise: targets, lost pieces and what waits to be added make up all that there was at the start and was added since;
-//! a piece within [`LEAST_ERROR`] of its target is not touched; no surface moves farther than [`CAP`] in a frame; the bits
-//! are the same on any number of threads. Limit: liquid that goes from one piece to another and parts again within a frame
+//! a piece within [`LEAST_ERROR`] of its target is not touched; no surface moves farther in a frame than [`cap`] says; the
+//! bits are the same on any number of threads. Limit: liquid that goes from one piece to another and parts again within a frame
 //! is not noticed.
 
 mod follow;
@@ -31,8 +31,14 @@ use pieces::{Measured, Pieces};
 
 /// Error of a piece's volume ÷ its target up to which its surface stays.
 pub const LEAST_ERROR: f64 = 1e-5;
-/// The farthest that a surface is moved in a frame, in surface cells.
+/// The farthest that the surface of a liquid at rest is moved in a frame, in solver cells.
 pub const CAP: f64 = 0.1;
+/// Share of the way of the fastest liquid in a frame up to which its surface is moved besides, and the farthest, in solver
+/// cells. What moves by cells in a frame loses more at once than [`CAP`] gives back, and hides a larger move.
+const OF_WAY: f64 = 0.1;
+const FARTHEST: f64 = 0.5;
+/// The farthest that a surface is moved in a frame, in its own cells: in the first move half of it, which φ follows.
+const OWN_CAP: f64 = 1.0;
 /// Times that a surface is moved in a frame, at most, each at most half as far as the one before.
 const PASSES: u32 = 8;
 /// Moves after which it is enough that the errors of all pieces sum up to [`CLOSE`] of the volume.
@@ -101,7 +107,7 @@ pub struct VolumeReport {
     pub pieces: usize,
     /// The largest error of a piece's volume, m³.
     pub worst: f64,
-    /// The farthest that a surface was moved, in surface cells.
+    /// The farthest that a surface was moved, in solver cells.
     pub moved: f64,
     /// Pieces that vanished.
     pub lost: Vec<LostPiece>,
@@ -164,18 +170,33 @@ impl VolumeTargets {
         self.pieces.iter().fold(0.0, |sum, piece| sum + piece.measured)
     }
 
+    /// What all pieces should enclose, m³.
+    pub fn target(&self) -> f64 {
+        self.pieces.iter().fold(0.0, |sum, piece| sum + piece.volume)
+    }
+
     /// What was added and waits for a piece, m³.
     pub fn waiting(&self) -> f64 {
         self.changes.iter().fold(0.0, |sum, change| sum + change.volume)
     }
 
-    /// Follows the pieces of a surface that has moved, and moves it so that each encloses its target; once a frame. The
-    /// solid is where it is at the end of the frame.
+    /// Follows the pieces of a surface that has moved, and moves it by at most [`CAP`] so that each encloses its target;
+    /// once a frame. The solid is where it is at the end of the frame.
     pub fn correct(&mut self, surface: &mut MarkedSurface, solid: Option<&Distance<'_>>) -> VolumeReport {
-        let unit = self.unit(surface);
+        self.correct_within(surface, solid, CAP)
+    }
+
+    /// The same with surfaces moved by at most `most` solver cells.
+    pub fn correct_within(
+        &mut self,
+        surface: &mut MarkedSurface,
+        solid: Option<&Distance<'_>>,
+        most: f64,
+    ) -> VolumeReport {
+        let (unit, size) = (self.unit(surface), f64::from(surface.resolution()));
         let (mut found, mut lost) = self.follow(surface, solid);
         let before = self.corrected;
-        let (mut cap, mut moved) = (0.5 * CAP, 0.0);
+        let (mut cap, mut moved) = (0.5 * (most * size).min(OWN_CAP), 0.0);
         let mut responses = vec![1.0; found.all.len()];
         for pass in 0..PASSES {
             if pass >= FIRST_PASSES && self.is_close() {
@@ -200,7 +221,7 @@ impl VolumeTargets {
             // What vanished by a shift was not lost by the solver.
             self.corrected += vanished.iter().fold(0.0, |sum, piece| sum + piece.volume);
             lost.extend(vanished);
-            (found, cap, moved) = (now, 0.5 * cap, moved + farthest);
+            (found, cap, moved) = (now, 0.5 * cap, moved + farthest / size);
         }
         let report = self.report(&found, unit, moved, lost);
         VolumeReport { corrected_now: self.corrected - before, ..report }
@@ -212,6 +233,22 @@ impl VolumeTargets {
         sum(&|piece| (piece.measured - piece.volume).abs()) <= CLOSE * sum(&|piece| piece.volume)
     }
 
+    /// Takes out what was added where there is no piece, m³ and its places, for somebody else to carry on.
+    pub fn take_waiting(&mut self) -> Vec<LostPiece> {
+        let is_meant = |change: &Change| change.volume > 0.0 && change.at.is_some();
+        let (taken, kept): (Vec<Change>, Vec<Change>) = take(&mut self.changes).into_iter().partition(is_meant);
+        self.changes = kept;
+        taken.iter().filter_map(|change| Some(LostPiece { volume: change.volume, place: change.at? })).collect()
+    }
+
+    /// Drops what was to be taken and no piece had; returns how much, m³.
+    pub fn forgive(&mut self) -> f64 {
+        let (owed, kept): (Vec<Change>, Vec<Change>) =
+            take(&mut self.changes).into_iter().partition(|change| change.volume < 0.0);
+        self.changes = kept;
+        owed.iter().fold(0.0, |sum, change| sum - change.volume)
+    }
+
     /// Follows the pieces of a surface that has moved, and leaves it as it is.
     pub fn measure(&mut self, surface: &mut MarkedSurface, solid: Option<&Distance<'_>>) -> VolumeReport {
         let (found, lost) = self.follow(surface, solid);
@@ -220,7 +257,7 @@ impl VolumeTargets {
 
     fn report(&self, found: &Pieces, unit: f64, moved: f64, lost: Vec<LostPiece>) -> VolumeReport {
         let volume = unit * found.volume();
-        let target = self.pieces.iter().fold(0.0, |sum, piece| sum + piece.volume);
+        let target = self.target();
         let errors = self.pieces.iter().map(|piece| piece.measured - piece.volume);
         let share = |error: f64| if target > 0.0 { error / target } else { 0.0 };
         VolumeReport {
@@ -370,6 +407,11 @@ impl VolumeTargets {
             self.changes.push(Change { volume: everywhere - spread, at: None });
         }
     }
+}
+
+/// The farthest that a surface is to be moved after a frame in which the fastest liquid moved `way` solver cells.
+pub fn cap(way: f64) -> f64 {
+    (OF_WAY * way).clamp(CAP, FARTHEST)
 }
 
 /// Gives pieces of unknown origin what was lost elsewhere, up to their volumes: liquid that was too fast to be followed. What

@@ -181,6 +181,35 @@ fn what_is_added_goes_where_it_is_or_everywhere() {
 }
 
 #[test]
+fn what_waits_is_taken_over_and_what_is_owed_forgiven() {
+    let (mut surface, mut targets) = start([16; 3], ball([5.0; 3], 3.0));
+    let whole = sum(&targets);
+    targets.add(2.0, Some([14.0; 3]));
+    targets.add(-(whole + 1.5), Some([5.0; 3]));
+    targets.correct(&mut surface, None);
+    assert_near(targets.forgive(), 1.5, 1e-9);
+    assert_eq!(targets.take_waiting(), [LostPiece { volume: 2.0, place: [14.0; 3] }]);
+    assert!(targets.waiting() == 0.0 && targets.target() < 1e-9);
+}
+
+/// A tenth of a solver cell is the same way whatever the cells of the surface, and more where the liquid is fast.
+#[test]
+fn surfaces_move_by_parts_of_solver_cells() {
+    for resolution in [1, 3] {
+        let mut surface = MarkedSurface::new(Domain::closed([0; 3], [12; 3]), resolution, |p| p[1] - 6.0, 0, 1);
+        let mut targets = VolumeTargets::new(&mut surface, 1.0, None);
+        targets.add(144.0, None);
+        let mut before = targets.volume();
+        for (way, moved) in [(0.0, CAP), (1.0, CAP), (2.0, 0.2), (100.0, 1.0 / f64::from(resolution).max(2.0))] {
+            let report = targets.correct_within(&mut surface, None, cap(way));
+            assert!((report.moved / moved - 1.0).abs() < 0.02, "{resolution} {way}: {report:?}");
+            assert_near(report.volume - before, 144.0 * moved, 0.05);
+            before = report.volume;
+        }
+    }
+}
+
+#[test]
 fn a_film_on_a_wall_moves_by_the_cap_at_most() {
     let (mut surface, mut targets) = start([16, 12, 16], |p| p[1] - 1.6);
     let top = |surface: &MarkedSurface| surface.mesh(None).points.iter().fold(0.0_f32, |top, p| top.max(p[1]));

@@ -5,7 +5,7 @@ use liquid::tag::{TagSource, TagValues};
 use numerics::vector::{length, scale, sub};
 
 /// The output `particles` at a frame.
-fn particles_at(bench: &Bench, frame: i64) -> Component {
+pub(super) fn particles_at(bench: &Bench, frame: i64) -> Component {
     let (engine, frame) = (Engine::new(&Settings::default()).unwrap(), Frame::whole(frame));
     cook_all(&engine, &bench.graph(), &[frame]).0[&(1, frame)].points().unwrap().clone()
 }

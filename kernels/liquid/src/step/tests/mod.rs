@@ -1,5 +1,6 @@
 //! The laws that a liquid keeps, on small grids; `examples/dam_break.rs` has them on larger ones.
 
+mod balls;
 mod dam;
 mod decoupled;
 mod force;
