@@ -2,6 +2,7 @@
 
 use super::carried::particles_at;
 use super::*;
+use crate::shared::attributes::PARTICLE_SPRAY;
 
 /// The volumes of drops too small for the grid at a frame, m³, and how high they are.
 fn drops(bench: &Bench, frame: i64) -> Vec<(f32, f32)> {
@@ -61,7 +62,7 @@ fn a_sink_takes_no_more_than_there_was() {
     let falling = solving(cuboid([0.2, 0.2, 0.2], [0.7, 0.6, 0.8])).input(SINKS, drain).set(VISCOSITY, 1.0);
     let mut before = 0.0;
     for frame in &falling.frames(1..=14)[1..] {
-        assert!(metric(frame, SUNK) >= before && metric(frame, VOLUME_BALANCE).abs() < 0.02, "{:?}", frame.metrics);
+        assert!(metric(frame, SUNK) >= before && metric(frame, VOLUME_BALANCE).abs() < 0.03, "{:?}", frame.metrics);
         before = metric(frame, SUNK);
     }
     assert!(before > 0.0);
