@@ -181,7 +181,7 @@ metrics! { METRICS:
     MADE_GOOD_NOW = Metric::new("made_good_now", Unit::None, "What moving the surface made good of the volume in the frame, in % of it.");
     VOLUME_DRIFT = Metric::new("volume_drift", Unit::None, "Error of the volume that is left, relative to what it should be.")
         .warn_outside(-0.01, 0.01, "The volume of the liquid is off by more than a hundredth at these frames. With \
-            `volume_correction` the surface moves by up to a tenth of a cell in a frame to make it good, where there is room: drops and \
+            `volume_correction` the surface moves by a tenth to half a cell in a frame to make it good, where there is room: drops and \
             thin films take several frames, and where a box is full or colliders enclose the liquid, it stays off. Without \
             `volume_correction` it stays off, too.");
     VOLUME_BALANCE = Metric::new("volume_balance", Unit::None,

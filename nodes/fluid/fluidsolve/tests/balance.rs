@@ -62,7 +62,7 @@ fn a_sink_takes_no_more_than_there_was() {
     let falling = solving(cuboid([0.2, 0.2, 0.2], [0.7, 0.6, 0.8])).input(SINKS, drain).set(VISCOSITY, 1.0);
     let mut before = 0.0;
     for frame in &falling.frames(1..=14)[1..] {
-        assert!(metric(frame, SUNK) >= before && metric(frame, VOLUME_BALANCE).abs() < 0.02, "{:?}", frame.metrics);
+        assert!(metric(frame, SUNK) >= before && metric(frame, VOLUME_BALANCE).abs() < 0.03, "{:?}", frame.metrics);
         before = metric(frame, SUNK);
     }
     assert!(before > 0.0);
