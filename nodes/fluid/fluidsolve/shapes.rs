@@ -95,6 +95,12 @@ impl StartLiquid {
         self.meshes.iter().any(|(_, material)| *material != LiquidMaterial::default())
     }
 
+    /// The volume of a surface cell, m³, where a solver cell has this side, m.
+    fn unit(&self, cell: f64) -> f64 {
+        let side = cell / f64::from(self.by);
+        side * side * side
+    }
+
     /// What of the meshes lies where there is no liquid. `cell`: the side of a solver cell, m.
     pub(super) fn known(&self, domain: &Domain, colliders: &Colliders, cell: f64) -> StartLosses {
         let by = self.by as f32;
@@ -120,7 +126,7 @@ impl StartLiquid {
         if (0..self.found.len()).any(overlap) {
             losses.shown = 0.0;
         }
-        losses.shown *= (cell / f64::from(self.by)).powi(3);
+        losses.shown *= self.unit(cell);
         losses
     }
 
@@ -129,7 +135,7 @@ impl StartLiquid {
     pub(super) fn parts(&self, domain: &Domain, colliders: &Colliders, cell: f64) -> Vec<StartPart> {
         let by = self.by as i32;
         let bounds = [domain.low, domain.high].map(|corner| corner.map(|x| x * by));
-        let unit = (cell / f64::from(self.by)).powi(3);
+        let unit = self.unit(cell);
         let part = |n: usize| {
             let (shape, found) = (&self.meshes[n].0, &self.found[n]);
             let is_apart = || (0..self.found.len()).all(|other| other == n || !found.overlaps(&self.found[other]));
