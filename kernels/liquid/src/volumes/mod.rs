@@ -45,6 +45,9 @@ const PASSES: u32 = 8;
 const FIRST_PASSES: u32 = 2;
 /// Share of the volume that may be wrong after them: a twentieth of what a frame is to be kept to.
 const CLOSE: f64 = 5e-5;
+/// Share of a known volume from which on what cells round off is given back: edges, which faces that move make up for; a ball
+/// of three cells radius stays as it is.
+const ROUNDED: f64 = 0.04;
 /// Frames' worth of moves that the surface of the start may take to enclose a known volume.
 const START_MOVES: u32 = 3;
 /// Distance, in surface cells, from which liquid that is added belongs to no piece.
@@ -130,15 +133,20 @@ impl VolumeTargets {
         Self::of_parts(surface, cell, solid, &[])
     }
 
-    /// The same, but a piece of which all parts are known has their volume, and its surface is moved so that it encloses
-    /// that: cells round off edges.
+    /// The same, but a piece of which all parts are known has their volume, where cells round off much of it, and its surface
+    /// is moved so that it encloses that.
     pub fn of_parts(surface: &mut MarkedSurface, cell: f64, solid: Option<&Distance<'_>>, parts: &[StartPart]) -> Self {
         let found = Pieces::new(surface, solid);
         let now = marked(surface, &found);
         surface.markers_mut().set_pieces(now);
         let mut targets = Self { cell, pieces: Vec::new(), changes: Vec::new(), corrected: 0.0 };
         let unit = targets.unit(surface);
-        let known = known_volumes(&found, parts);
+        let is_off = |seen: f64, known: f64| (unit * seen / known - 1.0).abs() > ROUNDED;
+        let known: Vec<Option<f64>> = known_volumes(&found, parts)
+            .into_iter()
+            .zip(&found.all)
+            .map(|(known, piece)| known.filter(|known| is_off(piece.volume, *known)))
+            .collect();
         let most = if known.iter().any(Option::is_some) { START_MOVES } else { 0 };
         let volumes = found.all.iter().zip(known).map(|(piece, known)| known.unwrap_or(unit * piece.volume));
         targets.set(surface, &found, volumes);
