@@ -315,7 +315,7 @@ impl SkinObstaclePair<'_> {
                 let start = path[0];
                 hits.clear();
                 let closest_at_start = || self.closest_at_start(&solid, &bounds, start);
-                vertex::hits(&path, &self.still, &faces, closest_at_start, &self.rules, &mut hits);
+                vertex::hits(&path, &self.still, &faces, &closest_at_start, &self.rules, &mut hits);
                 for hit in &hits {
                     let corners = self.obstacle.surface.triangles[hit.face as usize];
                     let first = ([*vertex, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]);
@@ -355,7 +355,7 @@ impl SkinObstaclePair<'_> {
                 }
                 path_of(self.still.poses, *point, &mut path);
                 hits.clear();
-                vertex::hits(&path, &self.body, &faces, || None, &self.rules, &mut hits);
+                vertex::hits(&path, &self.body, &faces, &|| None, &self.rules, &mut hits);
                 for hit in &hits {
                     let [a, b, c] = self.skin.surface.triangles[hit.face as usize];
                     let [u, v, w] = hit.weights;

@@ -121,7 +121,7 @@ impl Pair<'_> {
                 }
                 hits.clear();
                 let path = poses.map(|pose| DVec3::from(pose[*vertex as usize]));
-                vertex::hits(&path, &on, &faces, || None, &self.rules, &mut hits);
+                vertex::hits(&path, &on, &faces, &|| None, &self.rules, &mut hits);
                 for hit in &hits {
                     let [a, b, c] = second.surface.triangles[hit.face as usize];
                     let [u, v, w] = hit.weights;

@@ -69,7 +69,7 @@ pub(super) fn hits(
     path: &[DVec3],
     on: &MovingSurface<'_>,
     faces: &[u32],
-    closest_at_start: impl FnOnce() -> Option<ClosestPoint>,
+    closest_at_start: &dyn Fn() -> Option<ClosestPoint>,
     rules: &ContactRules,
     out: &mut Vec<Hit>,
 ) {
