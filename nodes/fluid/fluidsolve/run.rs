@@ -120,7 +120,7 @@ impl Chain for Run {
         let mut run = Self {
             surface,
             motion,
-            started: targets.volume(),
+            started: targets.target() + targets.waiting(),
             sourced: 0.0,
             sunk: 0.0,
             left_domain: 0.0,
