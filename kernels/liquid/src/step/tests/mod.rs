@@ -3,6 +3,7 @@
 mod dam;
 mod decoupled;
 mod force;
+mod leaks;
 mod materials;
 mod outflow;
 mod periodic;
