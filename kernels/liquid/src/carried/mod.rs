@@ -54,7 +54,9 @@ impl TracerPoints {
             let (mut way, mut sampler) = (flow.reader(), PhiSampler::new(view));
             for point in points.iter_mut().filter(|point| is_outside(**point, domain).is_none()) {
                 if is_carried(&mut sampler, *point) {
-                    *point = kept_in(add(*point, displacement(&mut way, *point)), domain);
+                    let moved = displacement(&mut way, *point);
+                    let moved = flow.held(*point, moved, 1.0).map_or(moved, |held| held.way);
+                    *point = kept_in(add(*point, moved), domain);
                 }
             }
         });

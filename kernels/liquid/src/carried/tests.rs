@@ -37,7 +37,7 @@ fn tracers_in_a_turn_end_where_the_turn_puts_them() {
     let surface = marked(domain, |_| -5.0);
     let start: Vec<Vec3> = (1..14).map(|n| [16.0 + n as f32, 16.0, 0.3 * n as f32]).collect();
     let mut tracers = TracerPoints::new(start.clone());
-    let flow = Moving { velocity: &velocity, step: TAU / 60.0, periods: domain.periods() };
+    let flow = Moving { velocity: &velocity, step: TAU / 60.0, periods: domain.periods(), solid: None };
     for _ in 0..15 {
         tracers.advance(&flow, crate::step::Surface::view(&surface), &domain);
     }
@@ -70,7 +70,7 @@ fn tracers_leave_through_open_walls_alone() {
     let mut tracers = TracerPoints::new(vec![[7.5, 2.0, 2.0], [2.0, 7.5, 2.0], [1.0, 1.0, 1.0]]);
     for _ in 0..2 {
         tracers.advance(
-            &Moving { velocity: &velocity, step: 1.0, periods: domain.periods() },
+            &Moving { velocity: &velocity, step: 1.0, periods: domain.periods(), solid: None },
             crate::step::Surface::view(&surface),
             &domain,
         );
@@ -125,7 +125,7 @@ fn materials_are_not_mixed() {
     let level_set = vec![-5.0; rows.len()];
     let mut volumes = Vec::new();
     for _ in 0..60 {
-        materials.advance(&Moving { velocity: &velocity, step: 0.1, periods: domain.periods() }, &domain);
+        materials.advance(&Moving { velocity: &velocity, step: 0.1, periods: domain.periods(), solid: None }, &domain);
         let cells = materials.settle(&rows, &level_set, view, &domain, [0.0, 1000.0]);
         volumes.push(cells.density.iter().map(|density| f64::from(density - 1000.0) / 400.0).sum::<f64>());
         let count = materials.points().len();

@@ -12,16 +12,20 @@ pub(crate) mod cubic;
 mod fill;
 mod refine;
 mod sample;
+mod sides;
 #[cfg(test)]
 mod tests;
 mod view;
 
-use numerics::vector::{Vec3, add, scale, sub, unit};
+use numerics::vector::{Vec3, add, scale, sub};
 use serde::{Deserialize, Serialize};
 
 pub use refine::refined;
 pub use sample::PhiSampler;
 pub(crate) use sample::floor;
+use sides::may_be_thin;
+pub use sides::{Held, outward};
+pub(crate) use sides::{Sides, held};
 pub use view::PhiView;
 pub(crate) use view::RowBlocks;
 
@@ -37,8 +41,14 @@ pub const CONTACT: f32 = 2.5;
 /// Heights above a solid, in cells, at which φ says how it goes on inside.
 const ABOVE: [f32; 2] = [0.5, 1.5];
 
+/// The same above a thin solid: φ between these cells has nothing of what is in it, which may be of the other side.
+const ABOVE_THIN: [f32; 2] = [1.0, 2.0];
+
 /// Depth in a solid up to which φ is the liquid's own.
 const SKIN: f32 = 0.25;
+
+/// Height above a thin solid up to which a cell may be next to one that goes on from the other side.
+const NEXT_TO: f32 = 0.4;
 
 /// A distance, in cells, of a place in them; negative inside.
 pub type Distance<'a> = dyn Fn(Vec3) -> f32 + Sync + 'a;
@@ -46,21 +56,17 @@ pub type Distance<'a> = dyn Fn(Vec3) -> f32 + Sync + 'a;
 /// What φ becomes at a place in cells, given φ there.
 pub type PhiChange<'a> = dyn Fn(Vec3, f32) -> f32 + Sync + 'a;
 
-/// The unit vector out of a solid, whose distance `solid` is, at a place in cells.
-pub fn outward(solid: &Distance<'_>, at: Vec3) -> Option<Vec3> {
-    let slope = |axis: usize| {
-        let (mut below, mut above) = (at, at);
-        (below[axis], above[axis]) = (at[axis] - 0.5, at[axis] + 0.5);
-        solid(above) - solid(below)
-    };
-    unit([slope(0), slope(1), slope(2)])
-}
-
 /// How far the liquid moves in one step.
 pub trait Flow: Sync {
     /// The way, in cells, from each point, a place in cells. Points of successive calls are near each other, which a
     /// reader may make use of.
     fn reader(&self) -> impl FnMut(Vec3) -> Vec3;
+
+    /// What is left of a way from a point, where a thin solid is in it: forwards in time, or backwards where `direction` is
+    /// −1 instead of 1.
+    fn held(&self, _from: Vec3, _way: Vec3, _direction: f32) -> Option<Held> {
+        None
+    }
 }
 
 impl<F: Fn(Vec3) -> Vec3 + Sync> Flow for F {
@@ -138,15 +144,22 @@ impl LevelSet {
         let far = far_from_surface(reach);
         let mut phi = std::mem::take(&mut self.phi);
         self.stencil.update([&mut phi], |runs, first, [phi]| {
-            let (mut flow, mut sampler) = (flow.reader(), PhiSampler::new(before));
+            let (mut way, mut sampler) = (flow.reader(), PhiSampler::new(before));
             for run in runs {
                 for n in 0..run.len as usize {
                     let value = &mut phi[run.at as usize + n - first];
                     if value.abs() < far {
                         let [x, y, z] = run.cell;
                         let at = [x + n as i32, y, z].map(|x| x as f32 + 0.5);
-                        let middle = sub(at, scale(flow(at), 0.5));
-                        *value = sampler.at(sub(at, flow(middle)));
+                        let middle = sub(at, scale(way(at), 0.5));
+                        let back = scale(way(middle), -1.0);
+                        let carried = sampler.at(add(at, back));
+                        let is_reached = *value > 0.0 && carried <= 0.0;
+                        // What is behind a thin solid does not come through it; φ above it is of this side.
+                        *value = match if is_reached { flow.held(at, back, -1.0) } else { None } {
+                            Some(held) => sampler.at(add(add(at, held.way), scale(held.normal, ABOVE_THIN[0]))),
+                            None => carried,
+                        };
                     }
                 }
             }
@@ -179,26 +192,23 @@ impl LevelSet {
     /// Makes the surface go on into a solid that it wets, to a depth of [`CONTACT`] cells, beyond which there is no liquid.
     /// `solid` is the distance from it, in cells, negative inside. φ goes on along the normal of the solid as it is
     /// [`ABOVE`] it, but does not fall towards the outside: a film thinner than a cell then has one surface, not two that
-    /// the grid cannot tell apart, a level pool stays level beside a slope, and liquid under an overhang ends there.
+    /// the grid cannot tell apart, a level pool stays level beside a slope, and liquid under an overhang ends there. In a
+    /// thin solid each half has φ of its own side.
     pub fn meet(&mut self, solid: &Distance<'_>) {
         let (rows, phi) = (self.rows().clone(), std::mem::take(&mut self.phi));
         let before = PhiView { rows: &rows, phi: &phi, ..self.view() };
         let start = || PhiSampler::new(before);
         let [phi] = rows.tabulate_with(start, |sampler, cell, n| {
-            let at = cell.map(|x| x as f32 + 0.5);
+            let (at, own) = (cell.map(|x| x as f32 + 0.5), phi[n]);
             let depth = -solid(at);
-            if depth < SKIN {
-                return [phi[n]];
-            }
             let value = if depth > CONTACT {
-                phi[n].max(depth - CONTACT)
+                own.max(depth - CONTACT)
+            } else if depth >= 0.0 {
+                continued(solid, sampler, at, depth, own)
+            } else if depth > -NEXT_TO && own > 0.0 && own < 1.0 {
+                parted(solid, sampler, at, -depth, own)
             } else {
-                outward(solid, at).map_or(phi[n], |normal| {
-                    let [near, far] = ABOVE.map(|height| sampler.at(add(at, scale(normal, depth + height))));
-                    let slope = ((far - near) / (ABOVE[1] - ABOVE[0])).clamp(0.0, 1.0);
-                    let at_wall = near - slope * ABOVE[0];
-                    if at_wall < 0.0 { at_wall - slope * depth } else { near.max(f32::MIN_POSITIVE) }
-                })
+                own
             };
             [value.clamp(-BAND, BAND)]
         });
@@ -242,6 +252,42 @@ impl LevelSet {
             }
         }
     }
+}
+
+/// φ at a place in a solid, whose distance there is −`depth`, as the liquid outside goes on.
+fn continued(solid: &Distance<'_>, sampler: &mut PhiSampler<'_>, at: Vec3, depth: f32, own: f32) -> f32 {
+    let Some(sides) = Sides::of(solid, at, depth) else { return own };
+    // In a thin solid what is the liquid's own may be that of the other side.
+    if depth < SKIN && !sides.is_thin() {
+        return own;
+    }
+    let heights = if sides.is_thin() { ABOVE_THIN } else { ABOVE };
+    let mut of_side = |Sides { normal, depth, .. }: Sides| {
+        let [at_wall, slope] = at_surface(sampler, add(at, scale(normal, depth)), normal, heights);
+        at_wall - slope * depth
+    };
+    // Half-way, liquid on either side goes on, so that its surface is not on its own side of the solid.
+    let own_side = of_side(sides);
+    sides.other().map_or(own_side, |other| own_side.min(of_side(other)))
+}
+
+/// φ at a place without liquid, `height` above a solid: without what is on the other side, where that is thin. Else each
+/// shift of the liquid's surface would move it closer, until it came out there.
+fn parted(solid: &Distance<'_>, sampler: &mut PhiSampler<'_>, at: Vec3, height: f32, own: f32) -> f32 {
+    let Some(normal) = outward(solid, at) else { return own };
+    if sampler.at(sub(at, normal)) >= 0.0 || !may_be_thin(solid, at, height, normal) {
+        return own;
+    }
+    let is_film = at_surface(sampler, sub(at, scale(normal, height)), normal, ABOVE_THIN)[0] < 0.0;
+    if is_film { own } else { own.max(sampler.at(add(at, normal)).min(1.0)) }
+}
+
+/// φ at a place on a solid, and how it falls into it, as it is at these heights above. If positive, that at the lower one.
+fn at_surface(sampler: &mut PhiSampler<'_>, place: Vec3, normal: Vec3, heights: [f32; 2]) -> [f32; 2] {
+    let [near, far] = heights.map(|height| sampler.at(add(place, scale(normal, height))));
+    let slope = ((far - near) / (heights[1] - heights[0])).clamp(0.0, 1.0);
+    let at_wall = near - slope * heights[0];
+    if at_wall < 0.0 { [at_wall, slope] } else { [near.max(f32::MIN_POSITIVE), 0.0] }
 }
 
 /// |φ| from which on a cell cannot come next to the surface in a step. φ may fall short of the distance by a fifth.

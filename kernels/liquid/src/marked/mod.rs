@@ -7,12 +7,12 @@
 mod tests;
 
 use numerics::parallel;
-use numerics::vector::{Vec3, add, scale, sub};
+use numerics::vector::{Vec3, add, dot, scale, sub};
 use serde::{Deserialize, Serialize};
 
 use crate::extract::{Placement, QuadMesh, extract};
-use crate::level_set::{BAND, Distance, Flow, LevelSet, PhiChange, PhiSampler, PhiView, outward};
-use crate::markers::Markers;
+use crate::level_set::{BAND, Distance, Flow, Held, LevelSet, PhiChange, PhiSampler, PhiView, Sides, outward};
+use crate::markers::{FARTHEST, Marker, Markers};
 use crate::rows::{Cell, CellRows, Periods};
 use crate::step::{Domain, Moving, Surface};
 
@@ -21,6 +21,9 @@ const IMAGES: i32 = 8;
 
 /// Depth in a solid, in surface cells, from which a marker is dropped: nearer, its plane is the surface outside, too.
 const INSIDE: f32 = 1.0;
+
+/// Cosine between the normals of a marker and of a thin solid from which it faces a side.
+const FACING: f32 = 0.7;
 
 /// Thickness of a film on a solid, in surface cells, from which a mesh of these cells shows it without holes: more than the
 /// diagonal of a cell.
@@ -267,9 +270,18 @@ impl Surface for MarkedSurface {
         let (size, unit) = (self.resolution as f32, 1.0 / self.resolution as f32);
         let scaled = |point: Vec3| size * solid(scale(point, unit));
         self.set.meet(&scaled);
-        // Those in its inside mark nothing that is seen.
+        // Those in its inside mark nothing that is seen, or what is seen on the wrong side of a thin one; those that face a
+        // side of a thin one are where liquid from one side ends in it.
+        let is_seen = |marker: &Marker| {
+            let depth = -scaled(marker.point);
+            let seen_from = |sides: Sides| {
+                let is_across = sides.behind < f32::INFINITY && dot(marker.normal, sides.normal).abs() > FACING;
+                sides.depth < INSIDE && sides.behind > FARTHEST && !is_across
+            };
+            depth <= 0.0 || depth < INSIDE && Sides::of(&scaled, marker.point, depth).is_none_or(seen_from)
+        };
         let markers = &self.markers.markers;
-        let seen = parallel::tabulate(markers.len(), CHUNK, |n| scaled(markers[n].point) > -INSIDE);
+        let seen = parallel::tabulate(markers.len(), CHUNK, |n| is_seen(&markers[n]));
         if seen.contains(&false) {
             self.markers.retain(|n| seen[n]);
         }
@@ -300,6 +312,12 @@ impl Flow for Scaled<'_> {
     fn reader(&self) -> impl FnMut(Vec3) -> Vec3 {
         let (mut way, size) = (self.flow.reader(), self.size);
         move |point| scale(way(scale(point, 1.0 / size)), size)
+    }
+
+    fn held(&self, from: Vec3, way: Vec3, direction: f32) -> Option<Held> {
+        let unit = 1.0 / self.size;
+        let held = self.flow.held(scale(from, unit), scale(way, unit), direction)?;
+        Some(Held { way: scale(held.way, self.size), ..held })
     }
 }
 

@@ -9,7 +9,7 @@ use crate::level_set::{LevelSet, far_from_surface};
 /// Markers count that are at most this much farther than the closest.
 const SPREAD: f32 = 0.5;
 /// Distance of the closest marker beyond which markers say nothing.
-const FARTHEST: f32 = 0.9;
+pub(crate) const FARTHEST: f32 = 0.9;
 /// Distance of the closest marker up to which its plane is the surface, wherever the others are.
 const NEXT_TO: f32 = 0.3;
 /// Share of the distance from the closest marker from which the distance from planes is one from the surface.

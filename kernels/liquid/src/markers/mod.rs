@@ -39,6 +39,7 @@ use serde::{Deserialize, Serialize};
 use crate::level_set::{Flow, LevelSet, PhiChange, PhiSampler, PhiView, displacement};
 use crate::rows::{Cell, Periods};
 use bins::Bins;
+pub(crate) use correct::FARTHEST;
 
 /// A point of the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -164,15 +165,16 @@ impl Markers {
     /// Moves points, and normals as the cross product of two tangents.
     fn advect(&mut self, flow: &impl Flow) {
         parallel::for_each(self.markers.chunks_mut(CHUNK), |_, markers| {
-            let mut flow = flow.reader();
+            let mut reader = flow.reader();
             for marker in markers {
-                let way = displacement(&mut flow, marker.point);
+                let way = displacement(&mut reader, marker.point);
                 let first = perpendicular(marker.normal);
                 let [a, b] = [first, cross(marker.normal, first)].map(|tangent| {
-                    let end = displacement(&mut flow, add(marker.point, scale(tangent, TANGENT)));
+                    let end = displacement(&mut reader, add(marker.point, scale(tangent, TANGENT)));
                     add(tangent, scale(sub(end, way), 1.0 / TANGENT))
                 });
-                marker.point = add(marker.point, way);
+                let held = flow.held(marker.point, way, 1.0);
+                marker.point = add(marker.point, held.map_or(way, |held| held.way));
                 marker.normal = unit(cross(a, b)).unwrap_or(marker.normal);
             }
         });

@@ -1,7 +1,8 @@
 //! The box that a liquid is in.
 
-use numerics::vector::{Vec3, unit};
+use numerics::vector::Vec3;
 
+use crate::level_set::outward;
 use crate::open_share::open_share;
 use crate::rows::{Cell, CellRows, Periods};
 use crate::velocity::{FaceFields, Site};
@@ -63,13 +64,13 @@ impl<'a> Solid<'a> {
 
 /// A solid at one time.
 #[derive(Clone, Copy)]
-pub(super) struct Obstacle<'a> {
+pub(crate) struct Obstacle<'a> {
     solid: Solid<'a>,
     time: f64,
 }
 
 impl Obstacle<'_> {
-    pub(super) fn distance(&self, point: Vec3) -> f32 {
+    pub(crate) fn distance(&self, point: Vec3) -> f32 {
         (self.solid.distance)(self.time, point)
     }
 
@@ -79,13 +80,7 @@ impl Obstacle<'_> {
 
     /// The unit vector out of it.
     pub(super) fn normal(&self, point: Vec3) -> Option<Vec3> {
-        let slope = |axis: usize| {
-            let (mut below, mut above) = (point, point);
-            below[axis] -= 0.5;
-            above[axis] += 0.5;
-            self.distance(above) - self.distance(below)
-        };
-        unit([slope(0), slope(1), slope(2)])
+        outward(&|point| self.distance(point), point)
     }
 }
 

@@ -1,8 +1,8 @@
 //! One substep.
 
-use numerics::vector::{Vec3, scale};
+use numerics::vector::{Vec3, add, length, scale, sub};
 
-use crate::level_set::{Distance, PhiChange, PhiView};
+use crate::level_set::{Distance, Held, PhiChange, PhiView, held};
 use crate::rows::{Cell, Periods};
 use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
@@ -64,7 +64,7 @@ pub trait Surface {
 }
 
 /// The ways of points in a substep.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Moving<'a> {
     /// Velocity, m/s.
     pub velocity: &'a MacVelocity,
@@ -72,14 +72,31 @@ pub struct Moving<'a> {
     pub step: f32,
     /// After how many cells it repeats.
     pub periods: Periods,
+    /// What is not passed, however thin.
+    pub(crate) solid: Option<Obstacle<'a>>,
 }
 
 impl<'a> Moving<'a> {
     /// The way, in cells, at a place in cells. Fast where successive places are near each other.
     pub fn reader(&self) -> impl FnMut(Vec3) -> Vec3 + use<'a> {
-        let Self { velocity, step, periods } = *self;
+        let Self { velocity, step, periods, .. } = *self;
         let mut sampler = Sampler::new(velocity.rows());
         move |point| scale(velocity.at(&mut sampler, periods.home_point(point)), step)
+    }
+
+    /// What is left of a way, in cells, from a place, where a thin solid is in it: forwards in time, or backwards where
+    /// `direction` is −1 instead of 1.
+    pub(crate) fn held(&self, from: Vec3, way: Vec3, direction: f32) -> Option<Held> {
+        let (solid, from) = (self.solid?, self.periods.home_point(from));
+        if solid.distance(from) > length(way) + FASTEST {
+            return None;
+        }
+        // The solid is where it is in the middle of the substep, and so far from where the way begins and from where it
+        // ends.
+        let half = scale(solid.velocity(from), 0.5 * direction * self.step);
+        let moved = scale(half, 2.0);
+        let held = held(&|point| solid.distance(point), add(from, half), sub(way, moved))?;
+        Some(Held { way: add(held.way, moved), ..held })
     }
 }
 
@@ -90,6 +107,9 @@ const STEEPEST: f32 = 0.25;
 /// Cells that liquid is followed over in a substep, at most, so that a substep takes a bounded time: what moves farther ends
 /// anywhere.
 const FARTHEST: f32 = 64.0;
+
+/// Cells that a solid moves in a substep, at most, for liquid to notice it on its way.
+const FASTEST: f32 = 2.5;
 
 /// Cells past the liquid, besides those that it moves, whose velocity is needed: a surface follows the flow in a band.
 const BAND: i32 = 5;
@@ -113,7 +133,7 @@ pub(super) fn substep(
     let reach = way.min(FARTHEST);
     let (velocity, carried) = continued(&settings.domain, motion, solid, seconds, [step, reach]);
     let periods = settings.domain.periods();
-    let flow = Moving { velocity: &velocity, step, periods };
+    let flow = Moving { velocity: &velocity, step, periods, solid };
     let outflow = outflow(&settings.domain, surface.view(), &flow, solid, settings.cell_volume());
     let left_domain = outflow.iter().map(|outflow| outflow.volume).sum();
     motion.outflow.extend(outflow);

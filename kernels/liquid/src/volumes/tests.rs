@@ -36,7 +36,7 @@ fn flow(size: Cell, way: impl Fn(Vec3) -> Vec3 + Sync) -> MacVelocity {
 }
 
 fn step(surface: &mut MarkedSurface, flow: &MacVelocity, reach: f32) {
-    surface.advance(&Moving { velocity: flow, step: 1.0, periods: Periods::NONE }, reach);
+    surface.advance(&Moving { velocity: flow, step: 1.0, periods: Periods::NONE, solid: None }, reach);
 }
 
 fn sum(targets: &VolumeTargets) -> f64 {
