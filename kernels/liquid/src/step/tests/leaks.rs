@@ -144,7 +144,7 @@ fn a_thin_bowl_holds_syrup() {
         let disk = |p: Vec3| (length([p[0] - 10.0, 0.0, p[2] - 10.0]) - 5.0).max((p[1] - 9.5).abs() - 1.5);
         let is_outside = |p: Vec3| {
             let [x, y, z] = [(p[0] - 10.0) / 10.0, (p[1] - 11.0) / 8.0, (p[2] - 10.0) / 10.0];
-            p[1] < 11.0 && x * x + y * y + z * z > 1.0
+            p[1] < 11.0 && length([x, y, z]) > 1.0
         };
         let leaked = scene.leaked(disk, is_outside);
         assert!(leaked < 1e-3, "{thickness}: {leaked}");
