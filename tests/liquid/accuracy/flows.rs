@@ -2,9 +2,8 @@
 
 use std::f32::consts::PI;
 
-use numerics::trig;
 use numerics::vector::{Vec3, length, scale, sub};
-use rayon::prelude::*;
+use numerics::{parallel, trig};
 
 /// Movements in a step on the faces of a cube of cells, read trilinearly, as a solver's velocity is.
 pub(crate) struct FaceMovement {
@@ -23,7 +22,7 @@ impl FaceMovement {
                 point[axis] -= 0.5 * h;
                 velocity(point)[axis] * dt / h
             };
-            (0..n * n * n).into_par_iter().map(face).collect()
+            parallel::tabulate(n * n * n, parallel::CHUNK, face)
         });
         Self { size, along }
     }
