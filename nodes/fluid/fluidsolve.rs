@@ -172,13 +172,14 @@ metrics! { METRICS:
     VOLUME_NOW = Metric::new("volume", Unit::CubicMetres, "Volume of the liquid, as the surface encloses it outside colliders.");
     VOLUME_DRIFT_RAW = Metric::new("volume_drift_raw", Unit::None,
         "Error of the volume, relative to what it should be, if it were never corrected.");
-    MADE_GOOD = Metric::new("volume_made_good", Unit::None,
-        "What moving the surface has made good of the volume since the start, in % of it.")
+    MADE_GOOD = Metric::new("volume_made_good", Unit::Percent,
+        "What moving the surface has made good since the start, in per cent of the volume.")
         .warn_last_above(10.0, "`volume_correction` has made good {volume_made_good} % of the liquid's volume by this frame, {made_good_now} \
-            % in the frame alone. The volume is right, but liquid may be thicker here and thinner there than it should be. What is \
+            % in the frame alone. The volume as a whole is right, but some parts of the liquid are too thick and others too thin. What is \
             lost are drops, sheets and jets of less than two cells, and what overlaps where surfaces meet; a smaller `cell` helps \
             where liquid stays smooth, not in a splash, which only becomes finer with it.");
-    MADE_GOOD_NOW = Metric::new("made_good_now", Unit::None, "What moving the surface made good of the volume in the frame, in % of it.");
+    MADE_GOOD_NOW = Metric::new("made_good_now", Unit::Percent,
+        "What moving the surface made good in the frame, in per cent of the volume.");
     VOLUME_DRIFT = Metric::new("volume_drift", Unit::None, "Error of the volume that is left, relative to what it should be.")
         .warn_outside(-0.01, 0.01, "The volume of the liquid is off by more than a hundredth at these frames. With \
             `volume_correction` the surface moves by a tenth to half a cell in a frame to make it good, where there is room: drops and \
@@ -187,9 +188,15 @@ metrics! { METRICS:
     VOLUME_BALANCE = Metric::new("volume_balance", Unit::None,
         "`volume`, `spray`, `sunk` and `left_domain` together, relative to what there was at the start and `sourced`: 0 where all \
             of it is somewhere.")
-        .warn_outside(-0.01, 0.01, "What is there, with what went, is off by {volume_balance} of all that there was and that came: \
+        .warn_outside(-0.01, 0.01, "Liquid was lost or gained: the sum of all volumes is off by {volume_balance} of what there should be. There are \
             {volume} m³ of liquid, {spray} of spray, {sunk} sunk, {left_domain} left, {sourced} sourced. Raise `resolution`, or lower \
             `cell` where colliders or sheets of liquid are thinner than two cells.");
+    MATERIAL_DRIFT = Metric::new("material_drift", Unit::None,
+        "Where liquids of several viscosities or densities meet: the largest error of the volume of one of them, relative to what \
+            it should be.")
+        .warn_outside(-1.0, 0.1, "One of the liquids of different viscosity or density has {material_drift} more or less than it \
+            should have: the others took its place, or gave it up. A layer thinner than a cell cannot be told from what is around it: \
+            use smaller cells.");
     SPRAY = Metric::new("spray", Unit::CubicMetres,
         "Volume of drops too small for the grid, which fly on their own as `spray` in `particles`.");
     EULER_CHARACTERISTIC = Metric::new("euler_characteristic", Unit::None,
@@ -240,7 +247,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "FluidSolve",
-    1,
+    2,
     "Simulates a liquid, from water to honey to nearly rigid. It falls, splashes, sloshes, piles up and creeps. `viscosity` has \
      the same effect at any cell size and time step.",
     Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),

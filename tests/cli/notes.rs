@@ -379,7 +379,7 @@ fn tets_with_another_volume_than_their_surface_are_noted() {
         notes(&bench, &[])
     };
     let coarse = twisted(3);
-    let start = "`body` (Tetrahedralize): `volume_error` is 1.23e-2 at frame 1. The tets cut corners of the surface";
+    let start = "`body` (Tetrahedralize): `volume_error` is 0.0123 at frame 1. The tets cut corners of the surface";
     assert!(matches!(&coarse[..], [one] if one.starts_with(start)), "{coarse:#?}");
     assert_eq!(twisted(12), [""; 0], "smaller faces, as the note advises");
 }

@@ -49,7 +49,13 @@ fn filled(text: &str, frame: Frame, published: &BTreeMap<&'static str, BTreeMap<
 
 /// A number as a person reads it: whole, or with three digits.
 fn rounded(x: f64) -> String {
-    if x.fract() == 0.0 && x.abs() < 1e15 { format!("{x}") } else { format!("{x:.2e}") }
+    let size = x.abs();
+    if x.fract() == 0.0 && size < 1e15 {
+        return format!("{x}");
+    }
+    let is_plain = (1e-3..1e6).contains(&size);
+    let decimals = [100.0, 10.0, 1.0, 0.1, 0.01].iter().position(|least| size >= *least).unwrap_or(5);
+    if is_plain { format!("{x:.decimals$}") } else { format!("{x:.2e}") }
 }
 
 #[cfg(test)]
@@ -85,7 +91,7 @@ mod tests {
     fn a_metric_beyond_its_limit_is_noted_once_with_its_worst_frame() {
         assert_eq!(shown("free", &[9.0]), Vec::<String>::new());
         assert_eq!(shown("deep", &[0.0, 0.5]), Vec::<String>::new());
-        assert_eq!(shown("deep", &[0.0, 0.75]), ["`fur` (Curve_Wind): `deep` is 7.50e-1 m at frame 1. Raise it."]);
+        assert_eq!(shown("deep", &[0.0, 0.75]), ["`fur` (Curve_Wind): `deep` is 0.750 m at frame 1. Raise it."]);
         assert_eq!(
             shown("deep", &[1.0, 3.0, 2.0, 0.0]),
             ["`fur` (Curve_Wind): `deep` is 3 m at frame 1 (frames 0-2). Raise it."]
@@ -97,7 +103,7 @@ mod tests {
         assert_eq!(shown("ratio", &[1.0, 0.95]), Vec::<String>::new());
         assert_eq!(
             shown("ratio", &[1.0, 1.25, 0.5]),
-            ["`fur` (Curve_Wind): `ratio` is 5.00e-1 at frame 2 (frames 1-2). Keep it."]
+            ["`fur` (Curve_Wind): `ratio` is 0.500 at frame 2 (frames 1-2). Keep it."]
         );
         assert_eq!(shown("far", &[3.0, 0.5, 3.0]), Vec::<String>::new());
         assert_eq!(shown("far", &[2.0, 3.0]), ["`fur` (Curve_Wind): `far` is 3 at frame 1 (frames 0-1). Come near."]);

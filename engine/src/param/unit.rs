@@ -5,6 +5,8 @@
 pub enum Unit {
     /// A plain number.
     None,
+    /// %
+    Percent,
     /// m
     Metres,
     /// s
@@ -54,6 +56,7 @@ impl Unit {
     pub fn sign(self) -> &'static str {
         match self {
             Self::None => "",
+            Self::Percent => "%",
             Self::Metres => "m",
             Self::Seconds => "s",
             Self::Frames => "frames",

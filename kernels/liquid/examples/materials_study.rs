@@ -21,7 +21,7 @@ fn drop(n: i32, viscosities: [f64; 2], densities: [f64; 2], is_split: bool) {
     let mut liquid = Liquid::new(settings, MarkedSurface::new(domain, 1, distance, 0, 1));
     let [viscosity, density] = [viscosities[0] as f32, densities[0] as f32];
     if is_split {
-        let own = LiquidMaterial { viscosity: Some(viscosity), density: Some(density) };
+        let own = LiquidMaterial { viscosity: Some(viscosity), density: Some(density), phase: 0 };
         liquid.set_materials(|p| if p[1] > 0.35 * size { own } else { LiquidMaterial::default() });
     }
     let pool = viscosities[1];

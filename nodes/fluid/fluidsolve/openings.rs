@@ -150,7 +150,7 @@ impl Opening {
 
     /// Whether its liquid is made of something else than the rest.
     pub(super) fn has_material(&self) -> bool {
-        self.materials.iter().any(|material| *material != LiquidMaterial::default())
+        self.materials.iter().any(LiquidMaterial::is_own)
     }
 
     /// The mesh at the end of the step, and where its attributes go.
@@ -163,7 +163,16 @@ impl Opening {
         let (sample, mix) = self.sample(share);
         let [from, to] = [sample, sample + 1].map(|n| self.materials[n.min(self.materials.len() - 1)]);
         let between = |from: Option<f32>, to: Option<f32>| Some(from? + mix as f32 * (to? - from?));
-        LiquidMaterial { viscosity: between(from.viscosity, to.viscosity), density: between(from.density, to.density) }
+        LiquidMaterial {
+            viscosity: between(from.viscosity, to.viscosity),
+            density: between(from.density, to.density),
+            phase: from.phase,
+        }
+    }
+
+    /// Makes its liquid one that does not mix with others.
+    pub(super) fn set_phase(&mut self, phase: u32) {
+        self.materials.iter_mut().for_each(|material| material.phase = phase);
     }
 
     /// ∫ of the rate between two shares of a step of that many seconds, m³: linear between samples, 0 where it is not active.
@@ -198,6 +207,7 @@ pub(super) fn material_of(mesh: &Component, what: &str) -> Result<LiquidMaterial
     Ok(LiquidMaterial {
         viscosity: once(SOURCE_VISCOSITY, |value| value >= 0.0, "0 or above")?,
         density: once(SOURCE_DENSITY, |value| value > 0.0, "above 0")?,
+        phase: 0,
     })
 }
 

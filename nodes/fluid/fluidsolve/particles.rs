@@ -90,7 +90,7 @@ fn set_materials(cx: &Cx, run: &Run, particles: &mut Component) -> Result<()> {
 }
 
 /// Viscosity, Pa·s, and density, kg/m³, of the liquid at places in solver cells, where they are not the solver's.
-pub(super) fn materials_at(motion: &Motion, places: &[[f32; 3]]) -> Vec<[Option<f32>; 2]> {
+fn materials_at(motion: &Motion, places: &[[f32; 3]]) -> Vec<[Option<f32>; 2]> {
     match motion.materials() {
         Some(materials) => {
             materials.closest_to(places).into_iter().map(|material| [material.viscosity, material.density]).collect()

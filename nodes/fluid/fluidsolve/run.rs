@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use engine::prelude::*;
-use liquid::carried::LiquidMaterial;
+use liquid::carried::{LiquidMaterial, MaterialPoints};
 use liquid::level_set::{BAND, PhiView};
 use liquid::marked::MarkedSurface;
 use liquid::step::{
@@ -18,14 +18,14 @@ use super::carried::CarriedColumns;
 use super::domain::{checks, domain, lattice, settings};
 use super::measured::{euler_characteristic, measured, pool_of};
 use super::openings::{Opening, SINK, SOURCE, Timed};
-use super::particles::{materials_at, particles};
+use super::particles::particles;
 use super::shapes::{Colliders, in_cells, liquid_at_start};
 use super::spray::{Air, SprayDrop, gathered, rejoining};
 use super::{
     CFL_REACHED, COLLECTING, DENSITY, EULER_CHARACTERISTIC, FAST_SHAPES, IN_COLLIDERS, INITIAL_SPIN, INITIAL_VELOCITY,
-    LEFT_DOMAIN, LIQUID_CELLS, MADE_GOOD, MADE_GOOD_NOW, MISWIRED, OUTSIDE, PARTICLES, PARTICLES_NOW, SINKS, SOURCED,
-    SOURCES, SPRAY, SUNK, SURFACE, TRACERS, TRACERS_OUTSIDE, UNSEEN, VOLUME, VOLUME_BALANCE, VOLUME_CORRECTION,
-    VOLUME_DRIFT, VOLUME_DRIFT_RAW, VOLUME_NOW, WITHHELD, WITHHELD_WIRE,
+    LEFT_DOMAIN, LIQUID_CELLS, MADE_GOOD, MADE_GOOD_NOW, MATERIAL_DRIFT, MISWIRED, OUTSIDE, PARTICLES, PARTICLES_NOW,
+    SINKS, SOURCED, SOURCES, SPRAY, SUNK, SURFACE, TRACERS, TRACERS_OUTSIDE, UNSEEN, VOLUME, VOLUME_BALANCE,
+    VOLUME_CORRECTION, VOLUME_DRIFT, VOLUME_DRIFT_RAW, VOLUME_NOW, WITHHELD, WITHHELD_WIRE,
 };
 use crate::shared::attributes::{SINK_RATE, SOURCE_RATE};
 use crate::shared::surface::{SurfaceDetail, surface};
@@ -55,6 +55,8 @@ pub(super) struct Run {
     /// Sources that gave nothing in the last frame, since it is too little.
     collecting: usize,
     targets: VolumeTargets,
+    /// The liquids at the start; those of sources are numbered on from there.
+    start_phases: u32,
     pub(super) spray: Vec<SprayDrop>,
     /// The attributes that came with liquid, sources and tracers.
     pub(super) columns: CarriedColumns,
@@ -94,6 +96,7 @@ impl Chain for Run {
         };
         let mut liquid = Liquid::new(settings(cx), surface);
         liquid.set_velocity(at, &around);
+        let start_phases = start.phases();
         if start.has_materials() {
             liquid.set_materials(|place| start.material(place));
         }
@@ -109,10 +112,11 @@ impl Chain for Run {
         }
         let places = tracers.iter().flat_map(|tracers| in_cells(tracers, lattice)).collect();
         liquid.set_tracers(places);
-        let (mut surface, motion) = liquid.into_parts();
+        let (mut surface, mut motion) = liquid.into_parts();
         let at_rest = |point: [f32; 3]| colliders.distance(1.0, point);
         let parts = if cx.get(VOLUME_CORRECTION) { parts } else { Vec::new() };
-        let targets = VolumeTargets::of_parts(&mut surface, lattice.cell, colliders.solid(&at_rest), &parts);
+        let (solid, materials) = (colliders.solid(&at_rest), motion.materials_mut());
+        let targets = VolumeTargets::of_parts(&mut surface, lattice.cell, solid, materials, &parts);
         let tracer_places = motion.tracers().points();
         let is_outside = |place: &&[f32; 3]| !domain.contains(place.map(|x| x.floor() as i32));
         start_metrics.set(TRACERS_OUTSIDE, tracer_places.iter().filter(is_outside).count() as f64);
@@ -128,6 +132,7 @@ impl Chain for Run {
             withheld_wire: 0,
             collecting: 0,
             targets,
+            start_phases,
             spray: Vec::new(),
             columns,
             tracer_ids: tracer_ids(&tracers),
@@ -189,7 +194,8 @@ impl Run {
         let lattice = lattice(cx);
         let openings = |input, says| Opening::all(cx, input, says, &settings.domain, lattice);
         let (mut sources, sinks) = (openings(SOURCES, SOURCE)?, openings(SINKS, SINK)?);
-        for source in &mut sources {
+        for (source, phase) in sources.iter_mut().zip(self.start_phases..) {
+            source.set_phase(phase);
             let (mesh, attributes) = source.attributes();
             *attributes = self.columns.add_mesh(mesh, lattice, &mut self.surface);
         }
@@ -218,8 +224,10 @@ impl Run {
         }
         let report = liquid.step_frame(&around, seconds);
         cx.check_cancelled()?;
-        for account in liquid.sources() {
-            self.targets.add(account.moved, Some(account.place));
+        let has_phases = liquid.motion().materials().is_some();
+        let phase = |n: u32| if has_phases { self.start_phases + n } else { 0 };
+        for (account, n) in liquid.sources().iter().zip(0..) {
+            self.targets.add_phase(account.moved, phase(n), Some(account.place));
         }
         for account in liquid.sinks() {
             self.targets.add(-account.moved, Some(account.place));
@@ -242,7 +250,7 @@ impl Run {
         });
         (self.surface, self.motion) = liquid.into_parts();
         for drop in rejoining(&mut self.spray, &self.surface, lattice.cell) {
-            self.targets.add(drop.volume, Some(drop.place));
+            self.targets.add_phase(drop.volume, drop.phase, Some(drop.place));
         }
         self.correct(cx, settings, &report, &air);
         Ok((report, fast))
@@ -256,9 +264,12 @@ impl Run {
         let corrected = match cx.get(VOLUME_CORRECTION) {
             true => {
                 let way = report.cfl_reached * f64::from(report.substeps);
-                self.targets.correct_within(&mut self.surface, solid, cap(way))
+                self.targets.correct_within(&mut self.surface, solid, self.motion.materials_mut(), cap(way))
             }
-            false => self.targets.measure(&mut self.surface, solid),
+            false => {
+                let phases = self.motion.materials().map(MaterialPoints::phases);
+                self.targets.measure(&mut self.surface, solid, phases.as_ref())
+            }
         };
         self.metrics.set(MADE_GOOD, percent(corrected.corrected, corrected.target));
         self.metrics.set(MADE_GOOD_NOW, percent(corrected.corrected_now, corrected.target));
@@ -268,15 +279,19 @@ impl Run {
         self.spray(&waiting, air);
         self.metrics.set(VOLUME_DRIFT_RAW, now.raw_drift);
         self.metrics.set(VOLUME_DRIFT, now.drift);
+        self.metrics.set(MATERIAL_DRIFT, now.phase_drift);
     }
 
     /// Makes drops of liquid that the grid does not show.
     fn spray(&mut self, pieces: &[LostPiece], air: &Air<'_>) {
         let mut sampler = Sampler::new(self.motion.rows());
-        let places: Vec<[f32; 3]> = pieces.iter().map(|piece| piece.place).collect();
-        for (piece, material) in pieces.iter().zip(materials_at(&self.motion, &places)) {
+        let places: Vec<([f32; 3], u32)> = pieces.iter().map(|piece| (piece.place, piece.phase)).collect();
+        let materials = self.motion.materials().map(|materials| materials.closest_of_phases(&places));
+        for (n, piece) in pieces.iter().enumerate() {
             let velocity = self.motion.velocity().at(&mut sampler, piece.place);
-            let mut drop = SprayDrop { place: piece.place, velocity, volume: piece.volume, material };
+            let material = materials.as_ref().map_or([None; 2], |own| [own[n].viscosity, own[n].density]);
+            let LostPiece { place, volume, phase } = *piece;
+            let mut drop = SprayDrop { place, velocity, volume, material, phase };
             drop.put_outside(air);
             self.spray.push(drop);
         }
@@ -293,11 +308,12 @@ impl Run {
         let mut liquid = Liquid::resume(settings, self.surface.clone(), std::mem::take(&mut self.motion));
         for (ball, volume) in balls {
             liquid.add_ball(&ball, solid, 0.0);
-            self.targets.add(volume, Some(ball.place));
+            self.targets.add_phase(volume, ball.material.phase, Some(ball.place));
         }
         (self.surface, self.motion) = liquid.into_parts();
+        let phases = self.motion.materials().map(MaterialPoints::phases);
         let at_end = |point: [f32; 3]| air.colliders.distance(1.0, point);
-        let now = self.targets.measure(&mut self.surface, air.colliders.solid(&at_end));
+        let now = self.targets.measure(&mut self.surface, air.colliders.solid(&at_end), phases.as_ref());
         self.spray(&now.lost, air);
         Some(now)
     }
@@ -313,7 +329,8 @@ impl Run {
         let (came, went) = (self.started + self.sourced, self.sunk + self.left_domain);
         // What pieces should hold is exact; what they do hold follows.
         let owned = self.targets.target() + self.targets.waiting() + spray;
-        debug_assert!((owned + went - came).abs() <= ROUNDING * came.max(went), "{owned} m³, {came} came, {went} went");
+        let off = owned + went - came;
+        debug_assert!(off.is_nan() || off.abs() <= ROUNDING * came.max(went), "{owned} m³, {came} came, {went} went");
         let error = self.targets.volume() + spray + went - came;
         self.metrics.set(VOLUME_BALANCE, if came > 0.0 { error / came } else { 0.0 });
         self.metrics.set(SPRAY, spray);
@@ -345,9 +362,9 @@ impl Run {
     }
 }
 
-/// A share of a volume in whole per cent, without its sign; 0 of none.
+/// A share of a volume in per cent, without its sign; 0 of none.
 fn percent(part: f64, whole: f64) -> f64 {
-    if whole > 0.0 { (100.0 * part / whole).abs().round() } else { 0.0 }
+    if whole > 0.0 { (100.0 * part / whole).abs() } else { 0.0 }
 }
 
 /// Wires of `sources` that are sinks, and of `sinks` that are sources.

@@ -92,7 +92,12 @@ impl StartMesh {
 impl StartLiquid {
     /// Whether a mesh has a material of its own.
     pub(super) fn has_materials(&self) -> bool {
-        self.meshes.iter().any(|(_, material)| *material != LiquidMaterial::default())
+        self.meshes.iter().any(|(_, material)| material.is_own())
+    }
+
+    /// Number of liquids that do not mix.
+    pub(super) fn phases(&self) -> u32 {
+        self.meshes.len().max(1) as u32
     }
 
     /// The volume of a surface cell, m³; `cell`: the side of a solver cell, m.
@@ -214,7 +219,7 @@ pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Res
     for (wire, mesh) in cx.at_start(LIQUID).iter().filter_map(|geometry| geometry.mesh()).enumerate() {
         let what = format!("`liquid` {wire} (counted from 0)");
         let topology = topology(mesh, fine, &what)?;
-        let material = material_of(mesh, &what)?;
+        let material = LiquidMaterial { phase: wire as u32, ..material_of(mesh, &what)? };
         let points = in_cells(mesh, fine);
         let least = cells_inside(mesh, &points, [low, high]);
         check_size(least, &what)?;

@@ -34,6 +34,8 @@ pub(super) struct SprayDrop {
     pub(super) volume: f64,
     /// Viscosity, Pa·s, and density, kg/m³, where they are not the solver's.
     pub(super) material: [Option<f32>; 2],
+    /// Which of the liquids that do not mix it is.
+    pub(super) phase: u32,
 }
 
 /// What drops fly in during a step.
@@ -91,7 +93,7 @@ impl SprayDrop {
             place: self.place,
             radius: self.radius(air.cell),
             velocity: self.velocity,
-            material: LiquidMaterial { viscosity, density },
+            material: LiquidMaterial { viscosity, density, phase: self.phase },
         };
         let distance = |at: [f32; 3]| air.colliders.distance(1.0, at);
         ball.beside(air.domain, &distance, |at| outward(&distance, at))
@@ -167,7 +169,8 @@ pub(super) fn gathered(spray: &mut Vec<SprayDrop>, air: &Air<'_>) -> Vec<(Liquid
             continue;
         }
         let reach = TOGETHER.max(spray[first].radius(air.cell));
-        let near = |n: &usize| !is_taken[*n] && length(sub(spray[*n].place, spray[first].place)) <= reach;
+        let is_same = |n: usize| !is_taken[n] && spray[n].phase == spray[first].phase;
+        let near = |n: &usize| is_same(*n) && length(sub(spray[*n].place, spray[first].place)) <= reach;
         let own: Vec<usize> = (0..spray.len()).filter(near).collect();
         let together = sum(own.iter().map(|n| &spray[*n]), &spray[first]);
         if together.volume < enough {
@@ -201,7 +204,7 @@ mod tests {
     use crate::shared::volume::Lattice;
 
     fn drop(place: [f32; 3], velocity: [f32; 3]) -> SprayDrop {
-        SprayDrop { place, velocity, volume: 1e-9, material: [None; 2] }
+        SprayDrop { place, velocity, volume: 1e-9, material: [None; 2], phase: 0 }
     }
 
     fn flown(drop: SprayDrop, domain: &Domain, steps: u32) -> Option<SprayDrop> {

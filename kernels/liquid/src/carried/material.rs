@@ -19,6 +19,7 @@ use crate::rows::{Cell, CellRows};
 use crate::step::{Domain, Moving};
 use crate::velocity::{Sampler, Site};
 
+use super::phases::PhaseShares;
 use super::{CHUNK, is_outside, kept_in};
 
 /// Points that a full cell gets: one in each octant.
@@ -47,16 +48,31 @@ pub struct LiquidMaterial {
     pub viscosity: Option<f32>,
     /// Mass of a volume, kg/m³.
     pub density: Option<f32>,
+    /// Which of the liquids that do not mix it is; the volume of each is kept.
+    pub phase: u32,
+}
+
+/// A material as it is kept: viscosity and density are negative where they are the liquid's own.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Stored {
+    values: [f32; 2],
+    phase: u32,
 }
 
 impl LiquidMaterial {
-    fn stored(self) -> [f32; 2] {
-        [self.viscosity, self.density].map(|value| value.unwrap_or(OWN))
+    /// Whether it has a viscosity or a density of its own.
+    pub fn is_own(&self) -> bool {
+        self.viscosity.is_some() || self.density.is_some()
     }
 
-    fn of([viscosity, density]: [f32; 2]) -> Self {
-        let own = |value: f32| if value >= 0.0 { Some(value) } else { None };
-        Self { viscosity: own(viscosity), density: own(density) }
+    fn stored(self) -> Stored {
+        let values = [self.viscosity, self.density].map(|value| value.unwrap_or(OWN));
+        Stored { values, phase: self.phase }
+    }
+
+    fn of(Stored { values, phase }: Stored) -> Self {
+        let [viscosity, density] = values.map(|value| if value >= 0.0 { Some(value) } else { None });
+        Self { viscosity, density, phase }
     }
 }
 
@@ -64,8 +80,8 @@ impl LiquidMaterial {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MaterialPoints {
     points: Vec<Vec3>,
-    /// Viscosity and density of each; negative where it is the liquid's own.
-    values: Vec<[f32; 2]>,
+    /// What each is made of.
+    values: Vec<Stored>,
     /// How often new points were looked for.
     rounds: u64,
 }
@@ -83,7 +99,7 @@ pub(crate) struct Stir {
     cells: Vec<Cell>,
     /// m³/s.
     rate: f64,
-    value: [f32; 2],
+    value: Stored,
 }
 
 impl Stir {
@@ -125,14 +141,37 @@ impl MaterialPoints {
         self.values.iter().map(|values| LiquidMaterial::of(*values))
     }
 
+    /// Where the phases are.
+    pub fn phases(&self) -> PhaseShares {
+        let (rows, slots) = self.slots();
+        PhaseShares::new(rows, slots.into_iter().zip(self.values.iter().map(|own| own.phase)).collect())
+    }
+
     /// The materials of the points closest to places, in cells.
     pub fn closest_to(&self, places: &[Vec3]) -> Vec<LiquidMaterial> {
+        let (rows, slots) = self.slots();
+        let near = Near { rows: &rows, bins: &Bins::of_cells(&slots, rows.len()), points: self };
+        parallel::tabulate(places.len(), CHUNK, |n| LiquidMaterial::of(near.closest(places[n], |_| true)))
+    }
+
+    /// The same of the points of a phase for each place; where there are none near, of any.
+    pub fn closest_of_phases(&self, places: &[(Vec3, u32)]) -> Vec<LiquidMaterial> {
+        let (rows, slots) = self.slots();
+        let near = Near { rows: &rows, bins: &Bins::of_cells(&slots, rows.len()), points: self };
+        let material = |(place, phase): (Vec3, u32)| {
+            let own = near.closest(place, |own| own.phase == phase);
+            LiquidMaterial::of(if own.phase == phase { own } else { near.closest(place, |_| true) })
+        };
+        parallel::tabulate(places.len(), CHUNK, |n| material(places[n]))
+    }
+
+    /// The cells that have points, and where among them that of each point is.
+    fn slots(&self) -> (CellRows, Vec<u32>) {
         let cells: Vec<Cell> = self.points.iter().map(|point| point.map(floor)).collect();
         let rows = CellRows::from_cells(&cells);
         let slot = |n: usize| rows.find(cells[n]).map_or(NOWHERE, |at| at as u32);
         let slots = parallel::tabulate(cells.len(), CHUNK, slot);
-        let near = Near { rows: &rows, bins: &Bins::of_cells(&slots, rows.len()), points: self };
-        parallel::tabulate(places.len(), CHUNK, |n| LiquidMaterial::of(near.closest(places[n])))
+        (rows, slots)
     }
 
     pub(crate) fn advance(&mut self, flow: &Moving<'_>, domain: &Domain) {
@@ -221,7 +260,7 @@ impl MaterialPoints {
         view: PhiView<'_>,
         domain: &Domain,
         bins: &Bins,
-    ) -> (Vec<Vec3>, Vec<[f32; 2]>) {
+    ) -> (Vec<Vec3>, Vec<Stored>) {
         let holes = rows.filtered(|cell, at| {
             level_set[at] < -LEAST_DEPTH && bins.of(at, at + 1).len() < LEAST && domain.contains(cell)
         });
@@ -239,14 +278,14 @@ impl MaterialPoints {
             }
         });
         let near = Near { rows, bins, points: self };
-        let values = parallel::tabulate(new.len(), CHUNK, |n| near.closest(new[n]));
+        let values = parallel::tabulate(new.len(), CHUNK, |n| near.closest(new[n], |_| true));
         (new, values)
     }
 
     /// The means over the points of each cell; `own` where there are none.
     fn in_cells(&self, rows: &CellRows, domain: &Domain, own: [f32; 2]) -> CellMaterials {
         let mut sums = vec![([0.0_f64; 2], 0_u32); rows.len()];
-        for (point, values) in self.points.iter().zip(&self.values) {
+        for (point, Stored { values, .. }) in self.points.iter().zip(&self.values) {
             let Some(at) = rows.find(cell_of(*point, domain)) else { continue };
             let [viscosity, density] = [0, 1].map(|n| f64::from(if values[n] >= 0.0 { values[n] } else { own[n] }));
             let ([inverse, mass], count) = &mut sums[at];
@@ -267,6 +306,49 @@ impl MaterialPoints {
         }
     }
 
+    /// Gives phases of which a piece has too little points of those of which it has too much, from where the two meet: the
+    /// closest first, and none that are farther than the next cell. A layer thinner than a cell loses its points to what is
+    /// around it, as new ones take the phase of the closest. `lacks`: by piece and phase, solver cells, below 0 what is too much;
+    /// `piece_of`: the piece at a place, in cells. Returns whether any changed.
+    pub(crate) fn exchange(
+        &mut self,
+        view: PhiView<'_>,
+        piece_of: &(dyn Fn(Vec3) -> Option<usize> + Sync),
+        lacks: &mut [Vec<f64>],
+    ) -> bool {
+        let (rows, slots) = self.slots();
+        let bins = Bins::of_cells(&slots, rows.len());
+        let near = Near { rows: &rows, bins: &bins, points: self };
+        let candidate = |n: usize| {
+            let (place, own) = (self.points[n], self.values[n].phase as usize);
+            let piece = piece_of(place)?;
+            let lack = |phase: usize| lacks[piece].get(phase).copied().unwrap_or_default();
+            let closest =
+                if lack(own) < 0.0 { near.within(place, 1, |other| lack(other.phase as usize) > 0.0) } else { None };
+            closest.map(|(square, other)| (square, n, piece, self.values[other]))
+        };
+        let candidates = parallel::tabulate(self.points.len(), CHUNK, candidate);
+        let mut candidates: Vec<_> = candidates.into_iter().flatten().collect();
+        candidates.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let held = |n: usize| {
+            let (slot, cell) = (slots[n] as usize, self.points[n].map(floor));
+            let phi = view.rows.find(cell).map_or(view.outside, |at| view.phi[at]);
+            f64::from((0.5 - phi).clamp(0.0, 1.0)) / bins.of(slot, slot + 1).len() as f64
+        };
+        let mut changed = Vec::new();
+        for (_, n, piece, to) in candidates {
+            let (volume, lacks) = (held(n), &mut lacks[piece]);
+            let [from, into] = [self.values[n].phase, to.phase].map(|phase| phase as usize);
+            if lacks[from] <= -0.5 * volume && lacks[into] >= 0.5 * volume {
+                lacks[from] += volume;
+                lacks[into] -= volume;
+                changed.push((n, to));
+            }
+        }
+        changed.iter().for_each(|(n, to)| self.values[*n] = *to);
+        !changed.is_empty()
+    }
+
     fn next_round(&mut self) -> u64 {
         self.rounds += 1;
         self.rounds
@@ -281,23 +363,26 @@ struct Near<'a> {
 }
 
 impl Near<'_> {
-    /// What the point closest to a place is made of; the liquid's own where there is none near.
-    fn closest(&self, place: Vec3) -> [f32; 2] {
+    /// What the closest point to a place that is meant is made of; the liquid's own where there is none near.
+    fn closest(&self, place: Vec3, is_meant: impl Fn(&Stored) -> bool) -> Stored {
+        let found = RINGS.iter().find_map(|ring| self.within(place, *ring, &is_meant));
+        found.map_or(LiquidMaterial::default().stored(), |(_, n)| self.points.values[n])
+    }
+
+    /// The closest point that is meant in the cells around that of a place, and the square of its distance.
+    fn within(&self, place: Vec3, ring: i32, is_meant: impl Fn(&Stored) -> bool) -> Option<(f32, usize)> {
         let cell = place.map(|x| floor(x.clamp(-FARTHEST, FARTHEST)));
-        for ring in RINGS {
-            let mut best: Option<(f32, u32)> = None;
-            for n in self.bins.around(self.rows, cell, ring) {
-                let way = sub(self.points.points[*n as usize], place);
+        let mut best: Option<(f32, usize)> = None;
+        for n in self.bins.around(self.rows, cell, ring).map(|n| *n as usize) {
+            if is_meant(&self.points.values[n]) {
+                let way = sub(self.points.points[n], place);
                 let square = dot(way, way);
                 if best.is_none_or(|(least, _)| square < least) {
-                    best = Some((square, *n));
+                    best = Some((square, n));
                 }
             }
-            if let Some((_, n)) = best {
-                return self.points.values[n as usize];
-            }
         }
-        [OWN; 2]
+        best
     }
 }
 

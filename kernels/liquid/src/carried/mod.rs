@@ -4,11 +4,14 @@
 //! Places are in cells. Bits are the same on any number of threads.
 
 mod material;
+mod phases;
 #[cfg(test)]
 mod tests;
 
 pub(crate) use material::{CellMaterials, Filled, Stir};
 pub use material::{LiquidMaterial, MaterialPoints};
+pub(crate) use phases::PhaseReader;
+pub use phases::PhaseShares;
 
 use numerics::parallel;
 use numerics::vector::{Vec3, add};

@@ -14,7 +14,7 @@ const STILL: Surroundings<'_> = Surroundings::new(&|_| [0.0; 3], &|_| 0.0);
 const FALLING: Surroundings<'_> = Surroundings::new(&|_| [0.0, -9.81, 0.0], &|_| 0.0);
 
 fn honey() -> LiquidMaterial {
-    LiquidMaterial { viscosity: Some(10.0), density: Some(1400.0) }
+    LiquidMaterial { viscosity: Some(10.0), density: Some(1400.0), phase: 1 }
 }
 
 fn marked(domain: Domain, distance: impl Fn(Vec3) -> f32 + Sync) -> MarkedSurface {
@@ -89,7 +89,7 @@ fn points_come_in_at_the_other_side_of_a_box_that_repeats() {
     liquid.set_velocity(|_| [1.0, 0.0, 0.0], &STILL);
     liquid.set_tracers(vec![[1.0, 2.0, 2.0], [7.5, 3.0, 3.0]]);
     let is_heavy = |p: Vec3| (p[0] - 4.0).abs() < 2.0;
-    let heavy = LiquidMaterial { density: Some(2000.0), viscosity: None };
+    let heavy = LiquidMaterial { density: Some(2000.0), viscosity: None, phase: 1 };
     liquid.set_materials(|p| if is_heavy(p) { heavy } else { LiquidMaterial::default() });
     // 1.2 m: one and a half times round.
     for _ in 0..12 {
@@ -142,7 +142,7 @@ fn cells_have_the_harmonic_mean_of_viscosities_and_the_mean_of_densities() {
     let surface = marked(domain, |_| -5.0);
     let view = crate::step::Surface::view(&surface);
     let mut materials = MaterialPoints::filling(&view, |p| match p[0] < 0.5 {
-        true => LiquidMaterial { viscosity: Some(1e6), density: Some(3000.0) },
+        true => LiquidMaterial { viscosity: Some(1e6), density: Some(3000.0), phase: 1 },
         false => LiquidMaterial::default(),
     });
     let rows = CellRows::cuboid(domain.low, domain.high);
@@ -185,7 +185,7 @@ fn what_is_poured_takes_the_place_of_its_share() {
     liquid.set_materials(|_| LiquidMaterial::default());
     let ball = |_: f64, p: Vec3| length(sub(p, [6.0, 3.0, 6.0])) - 2.5;
     let rate = |from: f64, to: f64| 0.2 * (to - from);
-    let brine = LiquidMaterial { density: Some(1200.0), viscosity: None };
+    let brine = LiquidMaterial { density: Some(1200.0), viscosity: None, phase: 1 };
     let material = |_: f64| brine;
     let sources = [LiquidSource { material: &material, ..LiquidSource::new(shape(&ball), Some(&rate)) }];
     let around = Surroundings { sources: &sources, ..FALLING };

@@ -18,7 +18,7 @@ mod tests;
 mod thickness;
 
 use numerics::parallel;
-use numerics::vector::{Vec3, to_f64};
+use numerics::vector::{Vec3, add, scale, to_f64};
 use numerics::volume;
 
 use crate::level_set::PhiView;
@@ -104,6 +104,11 @@ impl QuadMesh {
     pub(crate) fn twice_area(&self, quad: [u32; 4]) -> f64 {
         let [a, b, c, d] = quad.map(|at| to_f64(self.points[at as usize]));
         (b - a).cross(&(c - a)).norm() + (c - a).cross(&(d - a)).norm()
+    }
+
+    /// The mean of a quad's corners.
+    pub(crate) fn middle(&self, quad: [u32; 4]) -> Vec3 {
+        scale(quad.iter().fold([0.0; 3], |sum, at| add(sum, self.points[*at as usize])), 0.25)
     }
 
     fn sum(&self, of: impl Fn([u32; 4]) -> f64 + Sync) -> f64 {

@@ -97,6 +97,11 @@ impl Motion {
         self.materials.as_ref()
     }
 
+    /// The same, for what corrects volumes.
+    pub fn materials_mut(&mut self) -> Option<&mut MaterialPoints> {
+        self.materials.as_mut()
+    }
+
     /// Moves all that the liquid carries besides its velocity; `view` is where it is before.
     pub(super) fn carry(&mut self, flow: &Moving<'_>, view: PhiView<'_>, settings: &LiquidSettings) {
         self.tracers.advance(flow, view, &settings.domain);

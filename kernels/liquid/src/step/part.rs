@@ -6,7 +6,7 @@
 
 use numerics::vector::{Vec3, length, sub};
 
-/// Half of the least piece that is filled where no liquid is, in cells: a surface loses smaller ones.
+/// Half the size, in cells, of the smallest part that is filled where no liquid is: the surface would lose a smaller one.
 pub(super) const LEAST: f32 = 1.0;
 
 /// A part of a shape.

@@ -157,22 +157,37 @@ impl<'a> Sampler<'a> {
 
     #[cold]
     fn value_beside(&mut self, field: &[f32], site: Site, point: Vec3) -> f32 {
-        let ([x, y, z], t) = split(site, point);
         let (mut sum, mut weights) = (0.0, 0.0);
-        for corner in 0..8 {
-            let up = [corner & 1, corner >> 1 & 1, corner >> 2];
+        for (at, weight) in self.stored_beside(site, point).into_iter().flatten() {
+            sum += weight * field[at];
+            weights += weight;
+        }
+        if weights > 0.0 { sum / weights } else { 0.0 }
+    }
+
+    /// Where the values are that make up the one at a point, and their weights, which sum up to 1; none where there is no cell.
+    pub(crate) fn weights(&mut self, site: Site, point: Vec3) -> [Option<(usize, f32)>; 8] {
+        let mut found = self.stored_beside(site, point);
+        let sum = found.iter().flatten().fold(0.0, |sum, (_, weight)| sum + weight);
+        found.iter_mut().flatten().for_each(|(_, weight)| *weight /= sum);
+        found
+    }
+
+    /// Those of the eight corners around a point that are stored and count, with their weights; else the closest cell.
+    fn stored_beside(&mut self, site: Site, point: Vec3) -> [Option<(usize, f32)>; 8] {
+        let ([x, y, z], t) = split(site, point);
+        let mut found: [Option<(usize, f32)>; 8] = std::array::from_fn(|corner| {
+            let up = [0, 1, 2].map(|axis| corner as i32 >> axis & 1);
             let weight = |axis: usize| if up[axis] == 1 { t[axis] } else { 1.0 - t[axis] };
-            if let Some(at) = self.rows.find([x + up[0], y + up[1], z + up[2]]) {
-                let weight = weight(0) * weight(1) * weight(2);
-                sum += weight * field[at];
-                weights += weight;
-            }
+            let weight = weight(0) * weight(1) * weight(2);
+            let at = self.rows.find([x + up[0], y + up[1], z + up[2]])?;
+            (weight > 0.0).then_some((at, weight))
+        });
+        if found.iter().all(Option::is_none) {
+            let nearest = [0, 1, 2].map(|axis| [x, y, z][axis] + i32::from(t[axis] >= 0.5));
+            found[0] = self.closest(nearest).map(|at| (at, 1.0));
         }
-        if weights > 0.0 {
-            return sum / weights;
-        }
-        let nearest = [0, 1, 2].map(|axis| [x, y, z][axis] + i32::from(t[axis] >= 0.5));
-        self.closest(nearest).map_or(0.0, |at| field[at])
+        found
     }
 
     /// Where the value of the stored cell closest to `cell` is.

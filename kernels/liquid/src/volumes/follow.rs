@@ -1,15 +1,24 @@
 //! Where the liquid of each piece went, by the markers that were on it.
 
 use std::collections::BTreeMap;
+use std::mem::take;
 
+use numerics::parallel;
+use numerics::vector::{add, length, scale, sub};
+
+use super::pieces::Pieces;
+use super::{BESIDE, Change, LostPiece, PieceTarget, VolumeTargets};
+use crate::carried::PhaseShares;
+use crate::level_set::{Distance, floor};
+use crate::marked::MarkedSurface;
 use crate::markers::NO_PIECE;
 
 /// Liquid of an old piece in a new one, and the markers that say so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Passage {
-    pub(super) old: usize,
-    pub(super) new: usize,
-    pub(super) markers: usize,
+    old: usize,
+    new: usize,
+    markers: usize,
 }
 
 /// Of the markers of an old piece and of those on a new one, this share of either has to be in both. Fewer are markers
@@ -74,4 +83,183 @@ pub(super) fn passed_on(targets: &[f64], passages: &[Passage], volumes: &[f64]) 
         out[passage.new] += targets[passage.old] * weight / sums[passage.old];
     }
     out
+}
+
+impl VolumeTargets {
+    /// Finds the pieces and passes the targets on to them; returns them and the old ones that are in none.
+    pub(super) fn follow(
+        &mut self,
+        surface: &mut MarkedSurface,
+        solid: Option<&Distance<'_>>,
+        phases: Option<&PhaseShares>,
+    ) -> (Pieces, Vec<LostPiece>) {
+        let found = Pieces::new(surface, solid, phases);
+        let now = marked(surface, &found);
+        let (unit, size) = (self.unit(surface), surface.resolution() as f32);
+        let mut passages = passages(surface.markers().pieces(), &now);
+        self.keep_unmarked(surface, &found, &mut passages);
+        let unknown = self.newcomers(surface, &found, &mut passages);
+        let shares = |phase: usize| {
+            let targets: Vec<f64> = self.pieces.iter().map(|piece| piece.of_phase(phase)).collect();
+            let volumes: Vec<f64> = (0..found.all.len()).map(|piece| unit * found.volume_of(piece, phase)).collect();
+            passed_on(&targets, &passages, &volumes)
+        };
+        let mut shares: Vec<Vec<f64>> = (0..self.phases().max(found.phases.count())).map(shares).collect();
+        let mut is_lost = vec![true; self.pieces.len()];
+        passages.iter().for_each(|passage| is_lost[passage.old] = false);
+        let mut lost = self.lost(surface, &is_lost);
+        let volumes: Vec<f64> = found.all.iter().map(|piece| unit * piece.volume).collect();
+        find_again(&unknown, &volumes, &mut lost, &mut shares);
+        self.apply(&found, unit, &mut shares, &mut lost, size);
+        let on_lost = |old: &u32| is_lost.get(*old as usize).is_some_and(|is_lost| *is_lost);
+        let drop: Vec<bool> = surface.markers().pieces().iter().map(on_lost).collect();
+        surface.markers_mut().set_pieces(now);
+        if drop.contains(&true) {
+            // φ must not be made from them again.
+            surface.markers_mut().retain(|n| !drop[n]);
+        }
+        self.set(surface, &found, shares);
+        lost.retain(|piece| piece.volume > 0.0);
+        (found, lost)
+    }
+
+    /// Adds passages for old pieces that no marker was on because they fill all that holds them and have no surface to mark:
+    /// to such a piece where they were, at most as far off as they are large.
+    fn keep_unmarked(&self, surface: &MarkedSurface, found: &Pieces, passages: &mut Vec<Passage>) {
+        let (unit, size) = (self.unit(surface), surface.resolution() as f32);
+        let mut is_marked = vec![false; self.pieces.len()];
+        for old in surface.markers().pieces().iter().filter(|old| **old != NO_PIECE) {
+            is_marked[*old as usize] = true;
+        }
+        for (old, piece) in self.pieces.iter().enumerate().filter(|(old, _)| !is_marked[*old]) {
+            let near = |(_, away): &(usize, f32)| f64::from(*away) <= libm::cbrt(piece.measured / unit);
+            match found.closest(scale(piece.place, size)).filter(near) {
+                Some((new, _)) if found.all[new].area <= 0.0 => passages.push(Passage { old, new, markers: 1 }),
+                _ => {}
+            }
+        }
+    }
+
+    /// Adds passages for pieces that no marker was on: from the piece that most markers around were on. Returns those that
+    /// are of unknown origin. Pieces beside which something was added need none.
+    fn newcomers(&self, surface: &MarkedSurface, found: &Pieces, passages: &mut Vec<Passage>) -> Vec<usize> {
+        let size = surface.resolution() as f32;
+        let mut has_origin = vec![false; found.all.len()];
+        passages.iter().for_each(|passage| has_origin[passage.new] = true);
+        for change in self.changes.iter().filter(|change| change.volume > 0.0) {
+            let closest = change.at.and_then(|at| found.closest(scale(at, size)));
+            if let Some((piece, _)) = closest.filter(|(_, distance)| *distance < BESIDE) {
+                has_origin[piece] = true;
+            }
+        }
+        let mut unknown = Vec::new();
+        for new in (0..found.all.len()).filter(|piece| !has_origin[*piece]) {
+            let around = found.cells_around(new, BESIDE as i32);
+            let mut votes = vec![0; self.pieces.len()];
+            let markers = surface.markers();
+            for (marker, old) in markers.markers.iter().zip(markers.pieces()) {
+                if *old != NO_PIECE && around.find(marker.point.map(floor)).is_some() {
+                    votes[*old as usize] += 1;
+                }
+            }
+            match (0..votes.len()).rev().max_by_key(|old| votes[*old]).filter(|old| votes[*old] > 0) {
+                Some(old) => passages.push(Passage { old, new, markers: 1 }),
+                None => unknown.push(new),
+            }
+        }
+        unknown
+    }
+
+    /// The old pieces that are in no new one, where their markers are now.
+    fn lost(&self, surface: &MarkedSurface, is_lost: &[bool]) -> Vec<LostPiece> {
+        let size = 1.0 / surface.resolution() as f32;
+        let markers = surface.markers();
+        let lost = |(old, piece): (usize, &PieceTarget)| {
+            let own = markers.markers.iter().zip(markers.pieces()).filter(|(_, of)| **of as usize == old);
+            let (sum, count) = own.fold(([0.0; 3], 0.0), |(sum, n), (marker, _)| (add(sum, marker.point), n + 1.0));
+            let place = if count > 0.0 { scale(sum, size / count) } else { piece.place };
+            let of_phase =
+                move |(phase, volume): (usize, &f64)| LostPiece { volume: *volume, phase: phase as u32, place };
+            piece.phases.iter().enumerate().map(of_phase).collect::<Vec<_>>()
+        };
+        self.pieces.iter().enumerate().filter(|(old, _)| is_lost[*old]).flat_map(lost).collect()
+    }
+
+    /// Adds what came and takes what went, also from pieces that vanished where it went.
+    fn apply(&mut self, found: &Pieces, unit: f64, shares: &mut [Vec<f64>], lost: &mut [LostPiece], size: f32) {
+        let mut everywhere = 0.0;
+        for change in take(&mut self.changes) {
+            let Some(at) = change.at else {
+                everywhere += change.volume;
+                continue;
+            };
+            let closest = found.closest(scale(at, size));
+            let away = closest.map_or(f32::INFINITY, |(_, distance)| distance / size);
+            let vanished = lost.iter_mut().find(|piece| length(sub(piece.place, at)) < away);
+            match (vanished, closest) {
+                (Some(piece), _) if change.volume < 0.0 => everywhere += change_by(&mut piece.volume, change.volume),
+                (_, Some((piece, _))) if change.volume < 0.0 => {
+                    let there = |phase| unit * found.volume_of(piece, phase);
+                    let mut own: Vec<&mut f64> = shares.iter_mut().map(|phase| &mut phase[piece]).collect();
+                    everywhere += take_from(&mut own, there, change.volume);
+                }
+                (_, Some((piece, distance))) if distance < BESIDE => {
+                    shares[change.phase as usize][piece] += change.volume
+                }
+                _ => self.changes.push(change),
+            }
+        }
+        let sum = shares.iter().flatten().fold(0.0, |sum, share| sum + share);
+        let spread = if sum > 0.0 { everywhere.max(-sum) } else { 0.0 };
+        if spread != 0.0 {
+            shares.iter_mut().flatten().for_each(|share| *share *= 1.0 + spread / sum);
+        }
+        if spread != everywhere {
+            self.changes.push(Change { volume: everywhere - spread, phase: 0, at: None });
+        }
+    }
+}
+
+/// Takes from the phases of a piece, m³, given how much of each is there: those first of which less is there than should be.
+/// `volume` is negative; returns what could not be taken.
+pub(super) fn take_from(phases: &mut [&mut f64], there: impl Fn(usize) -> f64, volume: f64) -> f64 {
+    if let [only] = phases {
+        return change_by(only, volume);
+    }
+    let missing: Vec<f64> =
+        phases.iter().enumerate().map(|(n, phase)| (**phase - there(n)).clamp(0.0, **phase)).collect();
+    let sum = missing.iter().fold(0.0, |sum, missing| sum + missing);
+    let share = if sum > 0.0 { (-volume / sum).min(1.0) } else { 0.0 };
+    phases.iter_mut().zip(&missing).for_each(|(phase, missing)| **phase -= share * missing);
+    let rest = volume + share * sum;
+    let left = phases.iter().fold(0.0, |sum, phase| sum + **phase);
+    let share = if left > 0.0 { (-rest / left).min(1.0) } else { 0.0 };
+    phases.iter_mut().for_each(|phase| **phase *= 1.0 - share);
+    (rest + share * left).min(0.0)
+}
+
+/// Gives pieces of unknown origin what was lost elsewhere, up to their volumes: liquid that was too fast to be followed. What
+/// is more than that is nobody's, and correction takes it away.
+pub(super) fn find_again(unknown: &[usize], volumes: &[f64], lost: &mut [LostPiece], shares: &mut [Vec<f64>]) {
+    for piece in unknown {
+        for lost in lost.iter_mut() {
+            let held = shares.iter().fold(0.0, |sum, phase| sum + phase[*piece]);
+            let found = lost.volume.min(volumes[*piece] - held);
+            lost.volume -= found;
+            shares[lost.phase as usize][*piece] += found;
+        }
+    }
+}
+
+/// Adds to a volume, which stays at 0 or above; returns what could not be taken from it.
+fn change_by(volume: &mut f64, by: f64) -> f64 {
+    let sum = *volume + by;
+    *volume = sum.max(0.0);
+    sum.min(0.0)
+}
+
+/// The piece of each marker.
+pub(super) fn marked(surface: &MarkedSurface, found: &Pieces) -> Vec<u32> {
+    let markers = &surface.markers().markers;
+    parallel::tabulate(markers.len(), parallel::CHUNK, |n| found.of_marker(&markers[n]))
 }

@@ -5,28 +5,35 @@
 //! went: pieces that merge add up their targets, and one that splits shares its target by what the parts enclose. A piece
 //! that got too small for the grid is lost, with its target, to whoever carries it on.
 //!
+//! Liquids that do not mix are phases of a piece ([`LiquidMaterial`]); each has a target of its own. Two ways lead to it: what a
+//! piece lacks in all comes back where the phases that lack it are at its surface, and what one phase took from another is
+//! exchanged where they meet.
+//!
+//! [`LiquidMaterial`]: crate::carried::LiquidMaterial
+//!
 //! Promise: targets, lost pieces and what waits to be added make up all that there was at the start and was added since;
 //! a piece within [`LEAST_ERROR`] of its target is not touched; no surface moves farther in a frame than [`cap`] says; the
 //! bits are the same on any number of threads. Limit: liquid that goes from one piece to another and parts again within a frame
 //! is not noticed.
 
 mod follow;
+mod phases;
 mod pieces;
 #[cfg(test)]
 mod tests;
 
 use std::mem::take;
 
-use numerics::parallel;
-use numerics::vector::{Vec3, add, length, scale, sub};
+use numerics::vector::{Vec3, scale};
 use serde::{Deserialize, Serialize};
 
-use crate::level_set::Distance;
-use crate::level_set::floor;
+use crate::carried::{MaterialPoints, PhaseShares};
+use crate::level_set::{Distance, floor};
 use crate::marked::MarkedSurface;
-use crate::markers::NO_PIECE;
 use crate::rows::CellRows;
-use follow::{Passage, passages, passed_on};
+use crate::step::Surface;
+use follow::marked;
+use phases::{Ways, ways_of_phases};
 use pieces::{Measured, Pieces};
 
 /// Error of a piece's volume ÷ its target up to which its surface stays.
@@ -48,27 +55,42 @@ const CLOSE: f64 = 5e-5;
 /// Share of a known volume from which on what cells round off is given back: edges, which faces that move make up for; a ball
 /// of three cells radius stays as it is.
 const ROUNDED: f64 = 0.04;
+/// Share of the volume of a phase from which on it is exchanged for another in the same piece.
+const LEAST_EXCHANGED: f64 = 1e-3;
 /// Frames' worth of moves that the surface of the start may take to enclose a known volume.
 const START_MOVES: u32 = 3;
 /// Distance, in surface cells, from which liquid that is added belongs to no piece.
 const BESIDE: f32 = 4.0;
 
 /// How much a piece should enclose.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PieceTarget {
-    /// m³.
-    pub volume: f64,
+    /// Of each phase, m³.
+    pub phases: Vec<f64>,
     /// What its mesh enclosed when it was last measured, m³.
     pub measured: f64,
     /// The mean of its cells then, in solver cells.
     pub place: Vec3,
 }
 
-/// A piece that the grid no longer shows.
+impl PieceTarget {
+    /// Of all phases, m³.
+    pub fn volume(&self) -> f64 {
+        self.phases.iter().fold(0.0, |sum, volume| sum + volume)
+    }
+
+    fn of_phase(&self, phase: usize) -> f64 {
+        self.phases.get(phase).copied().unwrap_or_default()
+    }
+}
+
+/// Liquid of one phase that the grid no longer shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LostPiece {
     /// Its target, m³.
     pub volume: f64,
+    /// Its phase.
+    pub phase: u32,
     /// Where it was last seen, in solver cells.
     pub place: Vec3,
 }
@@ -78,6 +100,8 @@ pub struct LostPiece {
 struct Change {
     /// m³.
     volume: f64,
+    /// Its phase; where it went, what there is too little of is what went.
+    phase: u32,
     /// In solver cells; everywhere where `None`.
     at: Option<Vec3>,
 }
@@ -110,6 +134,8 @@ pub struct VolumeReport {
     pub pieces: usize,
     /// The largest error of a piece's volume, m³.
     pub worst: f64,
+    /// The largest error of the volume of a phase ÷ its target, where there are several.
+    pub phase_drift: f64,
     /// The farthest that a surface was moved, in solver cells.
     pub moved: f64,
     /// Pieces that vanished.
@@ -130,13 +156,21 @@ pub struct VolumeTargets {
 impl VolumeTargets {
     /// Targets that are what each piece of a surface encloses outside a solid. `cell` is the side of a solver cell, m.
     pub fn new(surface: &mut MarkedSurface, cell: f64, solid: Option<&Distance<'_>>) -> Self {
-        Self::of_parts(surface, cell, solid, &[])
+        Self::of_parts(surface, cell, solid, None, &[])
     }
 
     /// The same, but a piece of which all parts are known has their volume, where cells round off much of it, and its surface
     /// is moved so that it encloses that.
-    pub fn of_parts(surface: &mut MarkedSurface, cell: f64, solid: Option<&Distance<'_>>, parts: &[StartPart]) -> Self {
-        let found = Pieces::new(surface, solid);
+    pub fn of_parts(
+        surface: &mut MarkedSurface,
+        cell: f64,
+        solid: Option<&Distance<'_>>,
+        materials: Option<&mut MaterialPoints>,
+        parts: &[StartPart],
+    ) -> Self {
+        let known = materials.as_ref().map(|materials| materials.phases());
+        let (phases, mut materials) = (known.as_ref(), materials);
+        let found = Pieces::new(surface, solid, phases);
         let now = marked(surface, &found);
         surface.markers_mut().set_pieces(now);
         let mut targets = Self { cell, pieces: Vec::new(), changes: Vec::new(), corrected: 0.0 };
@@ -148,13 +182,17 @@ impl VolumeTargets {
             .map(|(known, piece)| known.filter(|known| is_off(piece.volume, *known)))
             .collect();
         let most = if known.iter().any(Option::is_some) { START_MOVES } else { 0 };
-        let volumes = found.all.iter().zip(known).map(|(piece, known)| known.unwrap_or(unit * piece.volume));
-        targets.set(surface, &found, volumes);
+        let volumes: Vec<f64> =
+            found.all.iter().zip(known).map(|(piece, known)| known.unwrap_or(unit * piece.volume)).collect();
+        let of_phase = |phase| {
+            volumes.iter().enumerate().map(|(piece, volume)| volume * found.phases.share(piece, phase)).collect()
+        };
+        targets.set(surface, &found, (0..found.phases.count()).map(of_phase).collect());
         for _ in 0..most {
             if targets.is_close() {
                 break;
             }
-            targets.correct(surface, solid);
+            targets.correct_within(surface, solid, materials.as_deref_mut(), CAP);
         }
         // What cells round off at the start is no drift.
         targets.corrected = 0.0;
@@ -163,9 +201,14 @@ impl VolumeTargets {
 
     /// Adds to what pieces should enclose, or takes from it where `volume`, m³, is negative: that of the piece around a
     /// place in solver cells, or of all pieces in proportion. Counts from the next correction on. What is added far from
-    /// any piece waits for one.
+    /// any piece waits for one. What goes is of the phases of which less is there than should be.
     pub fn add(&mut self, volume: f64, at: Option<Vec3>) {
-        self.changes.push(Change { volume, at });
+        self.add_phase(volume, 0, at);
+    }
+
+    /// The same with liquid of a phase, where it comes.
+    pub fn add_phase(&mut self, volume: f64, phase: u32, at: Option<Vec3>) {
+        self.changes.push(Change { volume, phase, at });
     }
 
     /// The pieces as of the last correction, in the order of their first cells.
@@ -180,7 +223,7 @@ impl VolumeTargets {
 
     /// What all pieces should enclose, m³.
     pub fn target(&self) -> f64 {
-        self.pieces.iter().fold(0.0, |sum, piece| sum + piece.volume)
+        self.pieces.iter().fold(0.0, |sum, piece| sum + piece.volume())
     }
 
     /// What was added and waits for a piece, m³.
@@ -191,18 +234,22 @@ impl VolumeTargets {
     /// Follows the pieces of a surface that has moved, and moves it by at most [`CAP`] so that each encloses its target;
     /// once a frame. The solid is where it is at the end of the frame.
     pub fn correct(&mut self, surface: &mut MarkedSurface, solid: Option<&Distance<'_>>) -> VolumeReport {
-        self.correct_within(surface, solid, CAP)
+        self.correct_within(surface, solid, None, CAP)
     }
 
-    /// The same with surfaces moved by at most `most` solver cells.
+    /// The same with surfaces moved by at most `most` solver cells: where a piece lacks volume, that of the phases that lack
+    /// it. What one phase lacks and another has too much of is exchanged where they meet.
     pub fn correct_within(
         &mut self,
         surface: &mut MarkedSurface,
         solid: Option<&Distance<'_>>,
+        materials: Option<&mut MaterialPoints>,
         most: f64,
     ) -> VolumeReport {
+        let known = materials.as_ref().map(|materials| materials.phases());
+        let phases = known.as_ref();
         let (unit, size) = (self.unit(surface), f64::from(surface.resolution()));
-        let (mut found, mut lost) = self.follow(surface, solid);
+        let (mut found, mut lost) = self.follow(surface, solid, phases);
         let before = self.corrected;
         let (mut cap, mut moved) = (0.5 * (most * size).min(OWN_CAP), 0.0);
         let mut responses = vec![1.0; found.all.len()];
@@ -210,35 +257,52 @@ impl VolumeTargets {
             if pass >= FIRST_PASSES && self.is_close() {
                 break;
             }
-            let by: Vec<f64> = found
-                .all
-                .iter()
-                .zip(&self.pieces)
-                .zip(&responses)
-                .map(|((piece, target), response)| shift(piece, target.volume / unit, *response, cap))
-                .collect();
-            let farthest = by.iter().fold(0.0_f64, |most, by| most.max(by.abs()));
+            let ways = self.ways(&found, unit, &responses, cap);
+            let farthest = ways.farthest();
             if farthest == 0.0 {
                 break;
             }
-            let shifts: Vec<f32> = by.iter().map(|by| *by as f32).collect();
-            found.shift(surface, &shifts);
-            let (now, vanished) = self.follow(surface, solid);
+            found.shift(surface, &ways, phases);
+            let (now, vanished) = self.follow(surface, solid, phases);
             self.corrected += unit * (now.volume() - found.volume());
-            responses = now.responses(&found, &by, &responses);
+            responses = now.responses(&found, &found.swept(&ways), &responses);
             // What vanished by a shift was not lost by the solver.
             self.corrected += vanished.iter().fold(0.0, |sum, piece| sum + piece.volume);
             lost.extend(vanished);
             (found, cap, moved) = (now, 0.5 * cap, moved + farthest / size);
         }
+        if let Some(materials) = materials
+            && self.exchange(&found, surface, materials)
+        {
+            let (now, vanished) = self.follow(surface, solid, Some(&materials.phases()));
+            lost.extend(vanished);
+            found = now;
+        }
         let report = self.report(&found, unit, moved, lost);
         VolumeReport { corrected_now: self.corrected - before, ..report }
+    }
+
+    /// Exchanges what phases of a piece lack and others have too much of; whether any was.
+    fn exchange(&self, found: &Pieces, surface: &MarkedSurface, materials: &mut MaterialPoints) -> bool {
+        let (unit, size) = (self.unit(surface), surface.resolution() as f32);
+        let cell = self.cell * self.cell * self.cell;
+        let lack = |n: usize, phase: usize| {
+            let (target, measured) = (self.pieces[n].of_phase(phase), unit * found.volume_of(n, phase));
+            let lack = (target - measured) / cell;
+            if lack.abs() > LEAST_EXCHANGED * target.max(measured) / cell { lack } else { 0.0 }
+        };
+        let count = self.phases().max(found.phases.count());
+        let lacks = |n: usize| (0..count).map(|phase| lack(n, phase)).collect();
+        let mut lacks: Vec<Vec<f64>> = (0..found.all.len()).map(lacks).collect();
+        let is_off = |lacks: &Vec<f64>| lacks.iter().any(|lack| *lack > 0.0) && lacks.iter().any(|lack| *lack < 0.0);
+        let piece_of = |place: Vec3| found.of_cell(scale(place, size).map(floor)).map(|piece| piece as usize);
+        lacks.iter().any(is_off) && materials.exchange(surface.view(), &piece_of, &mut lacks)
     }
 
     /// Whether further moves would change little.
     fn is_close(&self) -> bool {
         let sum = |of: &dyn Fn(&PieceTarget) -> f64| self.pieces.iter().fold(0.0, |sum, piece| sum + of(piece));
-        sum(&|piece| (piece.measured - piece.volume).abs()) <= CLOSE * sum(&|piece| piece.volume)
+        sum(&|piece| (piece.measured - piece.volume()).abs()) <= CLOSE * sum(&PieceTarget::volume)
     }
 
     /// Takes out what was added where there is no piece, m³ and its places, for somebody else to carry on.
@@ -246,7 +310,10 @@ impl VolumeTargets {
         let is_meant = |change: &Change| change.volume > 0.0 && change.at.is_some();
         let (taken, kept): (Vec<Change>, Vec<Change>) = take(&mut self.changes).into_iter().partition(is_meant);
         self.changes = kept;
-        taken.iter().filter_map(|change| Some(LostPiece { volume: change.volume, place: change.at? })).collect()
+        taken
+            .iter()
+            .filter_map(|change| Some(LostPiece { volume: change.volume, phase: change.phase, place: change.at? }))
+            .collect()
     }
 
     /// Drops what was to be taken and no piece had; returns how much, m³.
@@ -258,15 +325,20 @@ impl VolumeTargets {
     }
 
     /// Follows the pieces of a surface that has moved, and leaves it as it is.
-    pub fn measure(&mut self, surface: &mut MarkedSurface, solid: Option<&Distance<'_>>) -> VolumeReport {
-        let (found, lost) = self.follow(surface, solid);
+    pub fn measure(
+        &mut self,
+        surface: &mut MarkedSurface,
+        solid: Option<&Distance<'_>>,
+        phases: Option<&PhaseShares>,
+    ) -> VolumeReport {
+        let (found, lost) = self.follow(surface, solid, phases);
         self.report(&found, self.unit(surface), 0.0, lost)
     }
 
     fn report(&self, found: &Pieces, unit: f64, moved: f64, lost: Vec<LostPiece>) -> VolumeReport {
         let volume = unit * found.volume();
         let target = self.target();
-        let errors = self.pieces.iter().map(|piece| piece.measured - piece.volume);
+        let errors = self.pieces.iter().map(|piece| piece.measured - piece.volume());
         let share = |error: f64| if target > 0.0 { error / target } else { 0.0 };
         VolumeReport {
             volume,
@@ -277,6 +349,7 @@ impl VolumeTargets {
             corrected_now: 0.0,
             pieces: found.all.len(),
             worst: errors.fold(0.0, |worst, error| worst.max(error.abs())),
+            phase_drift: self.phase_drift(found, unit),
             moved,
             lost,
         }
@@ -288,173 +361,59 @@ impl VolumeTargets {
         cell * cell * cell
     }
 
-    /// Gives each piece its target, m³.
-    fn set(&mut self, surface: &MarkedSurface, found: &Pieces, targets: impl IntoIterator<Item = f64>) {
+    /// Number of phases that there are targets of.
+    fn phases(&self) -> usize {
+        let waiting = self.changes.iter().map(|change| change.phase as usize + 1).max();
+        self.pieces.iter().map(|piece| piece.phases.len()).max().max(waiting).unwrap_or(1)
+    }
+
+    /// The largest error of the volume of a phase ÷ its target.
+    fn phase_drift(&self, found: &Pieces, unit: f64) -> f64 {
+        let drift = |phase: usize| {
+            let target = self.pieces.iter().fold(0.0, |sum, piece| sum + piece.of_phase(phase));
+            let volume = (0..found.all.len()).fold(0.0, |sum, piece| sum + unit * found.volume_of(piece, phase));
+            if target > 0.0 { (volume / target - 1.0).abs() } else { 0.0 }
+        };
+        if found.phases.count() > 1 { (0..self.phases()).map(drift).fold(0.0, f64::max) } else { 0.0 }
+    }
+
+    /// Gives each piece its targets, by phase, m³.
+    fn set(&mut self, surface: &MarkedSurface, found: &Pieces, targets: Vec<Vec<f64>>) {
         let (unit, size) = (self.unit(surface), 1.0 / surface.resolution() as f32);
-        let piece = |(piece, volume): (&Measured, f64)| PieceTarget {
-            volume,
+        let piece = |(n, piece): (usize, &Measured)| PieceTarget {
+            phases: targets.iter().map(|phase| phase[n]).collect(),
             measured: unit * piece.volume,
             place: scale(piece.place, size),
         };
-        self.pieces = found.all.iter().zip(targets).map(piece).collect();
+        self.pieces = found.all.iter().enumerate().map(piece).collect();
     }
 
-    /// Finds the pieces and passes the targets on to them; returns them and the old ones that are in none.
-    fn follow(&mut self, surface: &mut MarkedSurface, solid: Option<&Distance<'_>>) -> (Pieces, Vec<LostPiece>) {
-        let found = Pieces::new(surface, solid);
-        let now = marked(surface, &found);
-        let (unit, size) = (self.unit(surface), surface.resolution() as f32);
-        let mut passages = passages(surface.markers().pieces(), &now);
-        self.keep_unmarked(surface, &found, &mut passages);
-        let unknown = self.newcomers(surface, &found, &mut passages);
-        let targets: Vec<f64> = self.pieces.iter().map(|piece| piece.volume).collect();
-        let volumes: Vec<f64> = found.all.iter().map(|piece| unit * piece.volume).collect();
-        let mut shares = passed_on(&targets, &passages, &volumes);
-        let mut is_lost = vec![true; self.pieces.len()];
-        passages.iter().for_each(|passage| is_lost[passage.old] = false);
-        let mut lost = self.lost(surface, &is_lost);
-        find_again(&unknown, &volumes, &mut lost, &mut shares);
-        self.apply(&found, &mut shares, &mut lost, size);
-        let on_lost = |old: &u32| is_lost.get(*old as usize).is_some_and(|is_lost| *is_lost);
-        let drop: Vec<bool> = surface.markers().pieces().iter().map(on_lost).collect();
-        surface.markers_mut().set_pieces(now);
-        if drop.contains(&true) {
-            // φ must not be made from them again.
-            surface.markers_mut().retain(|n| !drop[n]);
-        }
-        self.set(surface, &found, shares);
-        lost.retain(|piece| piece.volume > 0.0);
-        (found, lost)
-    }
-
-    /// Adds passages for old pieces that no marker was on because they fill all that holds them and have no surface to mark:
-    /// to such a piece where they were, at most as far off as they are large.
-    fn keep_unmarked(&self, surface: &MarkedSurface, found: &Pieces, passages: &mut Vec<Passage>) {
-        let (unit, size) = (self.unit(surface), surface.resolution() as f32);
-        let mut is_marked = vec![false; self.pieces.len()];
-        for old in surface.markers().pieces().iter().filter(|old| **old != NO_PIECE) {
-            is_marked[*old as usize] = true;
-        }
-        for (old, piece) in self.pieces.iter().enumerate().filter(|(old, _)| !is_marked[*old]) {
-            let near = |(_, away): &(usize, f32)| f64::from(*away) <= libm::cbrt(piece.measured / unit);
-            match found.closest(scale(piece.place, size)).filter(near) {
-                Some((new, _)) if found.all[new].area <= 0.0 => passages.push(Passage { old, new, markers: 1 }),
-                _ => {}
+    /// How far the surfaces of pieces have to move; at most `cap`. `responses`: how much the volume of each changes ÷ area ·
+    /// way.
+    fn ways(&self, found: &Pieces, unit: f64, responses: &[f64], cap: f64) -> Ways {
+        let count = found.phases.count();
+        let of_piece = |n: usize| {
+            let (piece, targets) = (&found.all[n], &self.pieces[n]);
+            let (target, per_way) = (targets.volume() / unit, responses[n] * piece.area);
+            let error = target - piece.volume;
+            if error.abs() <= LEAST_ERROR * target || piece.area <= 0.0 {
+                return vec![0.0; count];
             }
-        }
-    }
-
-    /// Adds passages for pieces that no marker was on: from the piece that most markers around were on. Returns those that
-    /// are of unknown origin. Pieces beside which something was added need none.
-    fn newcomers(&self, surface: &MarkedSurface, found: &Pieces, passages: &mut Vec<Passage>) -> Vec<usize> {
-        let size = surface.resolution() as f32;
-        let mut has_origin = vec![false; found.all.len()];
-        passages.iter().for_each(|passage| has_origin[passage.new] = true);
-        for change in self.changes.iter().filter(|change| change.volume > 0.0) {
-            let closest = change.at.and_then(|at| found.closest(scale(at, size)));
-            if let Some((piece, _)) = closest.filter(|(_, distance)| *distance < BESIDE) {
-                has_origin[piece] = true;
+            if count == 1 {
+                return vec![(error / per_way).clamp(-cap, cap)];
             }
-        }
-        let mut unknown = Vec::new();
-        for new in (0..found.all.len()).filter(|piece| !has_origin[*piece]) {
-            let around = found.cells_around(new, BESIDE as i32);
-            let mut votes = vec![0; self.pieces.len()];
-            let markers = surface.markers();
-            for (marker, old) in markers.markers.iter().zip(markers.pieces()) {
-                if *old != NO_PIECE && around.find(marker.point.map(floor)).is_some() {
-                    votes[*old as usize] += 1;
-                }
-            }
-            match (0..votes.len()).rev().max_by_key(|old| votes[*old]).filter(|old| votes[*old] > 0) {
-                Some(old) => passages.push(Passage { old, new, markers: 1 }),
-                None => unknown.push(new),
-            }
-        }
-        unknown
-    }
-
-    /// The old pieces that are in no new one, where their markers are now.
-    fn lost(&self, surface: &MarkedSurface, is_lost: &[bool]) -> Vec<LostPiece> {
-        let size = 1.0 / surface.resolution() as f32;
-        let markers = surface.markers();
-        let lost = |(old, piece): (usize, &PieceTarget)| {
-            let own = markers.markers.iter().zip(markers.pieces()).filter(|(_, of)| **of as usize == old);
-            let (sum, count) = own.fold(([0.0; 3], 0.0), |(sum, n), (marker, _)| (add(sum, marker.point), n + 1.0));
-            let place = if count > 0.0 { scale(sum, size / count) } else { piece.place };
-            LostPiece { volume: piece.volume, place }
+            let lack = |phase| (targets.of_phase(phase) / unit - found.volume_of(n, phase)) * error.signum();
+            let lacks: Vec<f64> = (0..count).map(|phase| lack(phase).max(0.0)).collect();
+            let areas: Vec<f64> = (0..count).map(|phase| responses[n] * found.phases.area(n, phase, 0.0)).collect();
+            ways_of_phases(error, &lacks, &areas, cap)
         };
-        self.pieces.iter().enumerate().filter(|(old, _)| is_lost[*old]).map(lost).collect()
-    }
-
-    /// Adds what came and takes what went, also from pieces that vanished where it went.
-    fn apply(&mut self, found: &Pieces, shares: &mut [f64], lost: &mut [LostPiece], size: f32) {
-        let mut everywhere = 0.0;
-        for change in take(&mut self.changes) {
-            let Some(at) = change.at else {
-                everywhere += change.volume;
-                continue;
-            };
-            let closest = found.closest(scale(at, size));
-            let away = closest.map_or(f32::INFINITY, |(_, distance)| distance / size);
-            let vanished = lost.iter_mut().find(|piece| length(sub(piece.place, at)) < away);
-            match (vanished, closest) {
-                (Some(piece), _) if change.volume < 0.0 => everywhere += change_by(&mut piece.volume, change.volume),
-                (_, Some((piece, distance))) if change.volume < 0.0 || distance < BESIDE => {
-                    everywhere += change_by(&mut shares[piece], change.volume);
-                }
-                _ => self.changes.push(change),
-            }
-        }
-        let sum = shares.iter().fold(0.0, |sum, share| sum + share);
-        let spread = if sum > 0.0 { everywhere.max(-sum) } else { 0.0 };
-        if spread != 0.0 {
-            shares.iter_mut().for_each(|share| *share *= 1.0 + spread / sum);
-        }
-        if spread != everywhere {
-            self.changes.push(Change { volume: everywhere - spread, at: None });
-        }
+        Ways { count, all: (0..found.all.len()).flat_map(of_piece).collect() }
     }
 }
 
 /// The farthest that a surface is to be moved after a frame in which the fastest liquid moved `way` solver cells.
 pub fn cap(way: f64) -> f64 {
     (OF_WAY * way).clamp(CAP, FARTHEST)
-}
-
-/// Gives pieces of unknown origin what was lost elsewhere, up to their volumes: liquid that was too fast to be followed. What
-/// is more than that is nobody's, and correction takes it away.
-fn find_again(unknown: &[usize], volumes: &[f64], lost: &mut [LostPiece], shares: &mut [f64]) {
-    for piece in unknown {
-        for lost in lost.iter_mut() {
-            let found = lost.volume.min(volumes[*piece] - shares[*piece]);
-            lost.volume -= found;
-            shares[*piece] += found;
-        }
-    }
-}
-
-/// Adds to a volume, which stays at 0 or above; returns what could not be taken from it.
-fn change_by(volume: &mut f64, by: f64) -> f64 {
-    let sum = *volume + by;
-    *volume = sum.max(0.0);
-    sum.min(0.0)
-}
-
-/// How far outward, in surface cells, the surface of a piece has to move; at most `cap`. `response`: how much its volume
-/// changes ÷ area · way.
-fn shift(piece: &Measured, target: f64, response: f64, cap: f64) -> f64 {
-    let error = target - piece.volume;
-    if error.abs() <= LEAST_ERROR * target || piece.area <= 0.0 {
-        return 0.0;
-    }
-    (error / (response * piece.area)).clamp(-cap, cap)
-}
-
-/// The piece of each marker.
-fn marked(surface: &MarkedSurface, found: &Pieces) -> Vec<u32> {
-    let markers = &surface.markers().markers;
-    parallel::tabulate(markers.len(), parallel::CHUNK, |n| found.of_marker(&markers[n]))
 }
 
 /// The volume of each piece, m³, where all its parts are in no other and have one.

@@ -3,8 +3,10 @@
 use std::f32::consts::FRAC_1_SQRT_2;
 
 use numerics::parallel;
-use numerics::vector::{Vec3, dot, length, sub};
+use numerics::vector::{Vec3, dot, length, scale, sub};
 
+use super::phases::{PhasesOfPieces, Ways};
+use crate::carried::{PhaseReader, PhaseShares};
 use crate::extract::{Placement, QuadMesh, extract_with};
 use crate::level_set::Distance;
 use crate::level_set::{PhiView, floor};
@@ -21,6 +23,8 @@ const DESCENT: usize = 5;
 const SAME: f64 = 0.1;
 /// Bounds of how much a volume changes ÷ area · way.
 const RESPONSES: [f64; 2] = [0.5, 4.0];
+/// φ of cells that hold some liquid is below, in cells.
+pub(super) const HOLDS: f32 = 0.5;
 
 /// A piece as it was measured, in surface cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -41,6 +45,7 @@ pub(super) struct Pieces {
     of_span: Vec<u32>,
     /// φ outside solids, where there are any.
     clipped: Option<Vec<f32>>,
+    pub(super) phases: PhasesOfPieces,
 }
 
 /// What a quad lies on.
@@ -54,7 +59,7 @@ struct Side {
 
 impl Pieces {
     /// The pieces of what is not in a solid.
-    pub(super) fn new(surface: &MarkedSurface, solid: Option<&Distance<'_>>) -> Self {
+    pub(super) fn new(surface: &MarkedSurface, solid: Option<&Distance<'_>>, phases: Option<&PhaseShares>) -> Self {
         let clipped = solid.map(|solid| surface.phi_outside(solid));
         let (view, whole) = (surface.view_of(clipped.as_deref()), surface.view_of(None));
         let inside = view.rows.filtered(|_, at| view.phi[at] < 0.0).clipped(view.low, view.high);
@@ -68,7 +73,41 @@ impl Pieces {
         }
         let (of_span, count) = numbered(&inside, surface.periods(), &mesh, &sides);
         let all = measured(&inside, &of_span, count, &mesh, &sides);
-        Self { all, inside, of_span, clipped }
+        let mut found = Self { all, inside, of_span, clipped, phases: PhasesOfPieces::one() };
+        if let Some(phases) = phases {
+            let free: Vec<(Vec3, u32, f64)> = mesh
+                .quads
+                .iter()
+                .zip(&sides)
+                .filter(|(_, side)| side.is_free)
+                .map(|(quad, side)| {
+                    (mesh.middle(*quad), found.of_span[side.span as usize], 0.5 * mesh.twice_area(*quad))
+                })
+                .collect();
+            let view = surface.view_of(found.clipped.as_deref());
+            found.phases = PhasesOfPieces::new(phases, &found, view, &free, surface.resolution() as f32);
+        }
+        found
+    }
+
+    /// The piece of which a cell, stored at `at`, holds some: its own, or that of the deepest cell that shares a face with it.
+    pub(super) fn holding(&self, view: PhiView<'_>, finder: &mut Finder<'_>, cell: Cell, at: usize) -> Option<u32> {
+        if view.phi[at] >= HOLDS || !contains(view, cell) {
+            return None;
+        }
+        if let Some(piece) = self.of_cell(cell) {
+            return Some(piece);
+        }
+        let mut deepest: Option<(f32, Cell)> = None;
+        for side in 0..6 {
+            let mut beside = cell;
+            beside[side / 2] += 2 * (side as i32 % 2) - 1;
+            let phi = finder.find(beside).map_or(view.outside, |at| view.phi[at]);
+            if phi < 0.0 && deepest.is_none_or(|(least, _)| phi < least) {
+                deepest = Some((phi, beside));
+            }
+        }
+        self.of_cell(deepest?.1)
     }
 
     /// The volume of all, in surface cells.
@@ -76,9 +115,24 @@ impl Pieces {
         self.all.iter().fold(0.0, |sum, piece| sum + piece.volume)
     }
 
-    /// How much the volume of each piece changed ÷ area · way, where `by` is the way of each surface since `before`. Films on
-    /// solids open and close holes, and so respond more than their area says. What did not move responds as it did.
-    pub(super) fn responses(&self, before: &Self, by: &[f64], known: &[f64]) -> Vec<f64> {
+    /// The volume of a phase in a piece, in surface cells.
+    pub(super) fn volume_of(&self, piece: usize, phase: usize) -> f64 {
+        self.all[piece].volume * self.phases.share(piece, phase)
+    }
+
+    /// Area · way of the surface of each piece.
+    pub(super) fn swept(&self, ways: &Ways) -> Vec<f64> {
+        let of_piece = |(n, piece): (usize, &Measured)| {
+            let of_phase = |phase| ways.all[n * ways.count + phase] * self.phases.area(n, phase, piece.area);
+            (0..ways.count).map(of_phase).fold(0.0, |sum, swept| sum + swept)
+        };
+        self.all.iter().enumerate().map(of_piece).collect()
+    }
+
+    /// How much the volume of each piece changed ÷ area · way, where `swept` is that product for each surface moved since
+    /// `before`. Films on solids open and close holes, and so respond more than their area says. What did not move responds as
+    /// it did.
+    pub(super) fn responses(&self, before: &Self, swept: &[f64], known: &[f64]) -> Vec<f64> {
         let of_piece = |piece: &Measured| {
             let away = |n: &usize| length(sub(before.all[*n].place, piece.place));
             let same = (0..before.all.len()).min_by(|a, b| away(a).total_cmp(&away(b)))?;
@@ -86,9 +140,9 @@ impl Pieces {
             if change.abs() > SAME * piece.volume {
                 return None;
             }
-            match by[same] == 0.0 {
+            match swept[same] == 0.0 {
                 true => Some(known[same]),
-                false => Some((change / (by[same] * before.all[same].area)).clamp(RESPONSES[0], RESPONSES[1])),
+                false => Some((change / swept[same]).clamp(RESPONSES[0], RESPONSES[1])),
             }
         };
         self.all.iter().map(|piece| of_piece(piece).unwrap_or(1.0)).collect()
@@ -136,19 +190,22 @@ impl Pieces {
         self.inside.filtered(|cell, _| self.of_cell(cell) == Some(piece as u32)).dilated(by)
     }
 
-    /// Moves the surface of each piece, which its markers know, outward by one of `by` cells.
-    pub(super) fn shift(&self, surface: &mut MarkedSurface, by: &[f32]) {
+    /// Moves the surface of each phase of each piece, which its markers know, outward by one of `ways`, in cells.
+    pub(super) fn shift(&self, surface: &mut MarkedSurface, ways: &Ways, phases: Option<&PhaseShares>) {
         let view = surface.view_of(self.clipped.as_deref());
-        let phi = surface.level_set().phi();
-        let [cells] = view.rows.tabulate_with(
-            || Finder::new(view.rows),
-            |finder, cell, at| {
-                let piece = if phi[at].abs() < NEAR { self.downhill(view, finder, cell) } else { None };
-                [piece.map_or(0.0, |piece| by[piece as usize])]
-            },
-        );
-        let of_marker = |piece: &u32| by.get(*piece as usize).copied().unwrap_or(0.0);
-        let markers: Vec<f32> = surface.markers().pieces().iter().map(of_marker).collect();
+        let (phi, by) = (surface.level_set().phi(), 1.0 / surface.resolution() as f32);
+        let start = || (Finder::new(view.rows), phases.map(PhaseShares::reader));
+        let [cells] = view.rows.tabulate_with(start, |(finder, reader), cell, at| {
+            let piece = if phi[at].abs() < NEAR { self.downhill(view, finder, cell) } else { None };
+            let middle = || cell.map(|x| (x as f32 + 0.5) * by);
+            [piece.map_or(0.0, |piece| ways.at(piece, reader.as_mut(), middle))]
+        });
+        let (markers, pieces) = (&surface.markers().markers, surface.markers().pieces());
+        let of_marker = |reader: &mut Option<PhaseReader<'_>>, n: usize| {
+            ways.at(pieces[n], reader.as_mut(), || scale(markers[n].point, by))
+        };
+        let start = || phases.map(PhaseShares::reader);
+        let markers = parallel::tabulate_with(markers.len(), parallel::CHUNK, start, of_marker);
         surface.shift(&cells, &markers);
     }
 

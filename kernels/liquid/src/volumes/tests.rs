@@ -1,8 +1,11 @@
 use std::f64::consts::PI;
 
+use numerics::vector::{length, sub};
 use rayon::ThreadPoolBuilder;
 
+use super::follow::{find_again, take_from};
 use super::*;
+use crate::carried::{LiquidMaterial, MaterialPoints};
 use crate::rows::{Cell, CellRows, Periods};
 use crate::step::{Domain, Liquid, LiquidSettings, LiquidSource, Motion, Moving, SourceShape, Surface, Surroundings};
 use crate::velocity::{MacVelocity, Site};
@@ -40,7 +43,7 @@ fn step(surface: &mut MarkedSurface, flow: &MacVelocity, reach: f32) {
 }
 
 fn sum(targets: &VolumeTargets) -> f64 {
-    targets.pieces().iter().map(|piece| piece.volume).sum()
+    targets.pieces().iter().map(|piece| piece.volume()).sum()
 }
 
 #[track_caller]
@@ -55,8 +58,8 @@ fn pieces_have_their_volumes() {
     let [first, second] = targets.pieces() else { panic!("{targets:?}") };
     // By their first cells: the larger ball starts at lower z.
     let alone = |centre, radius| sum(&start([32, 20, 20], ball(centre, radius)).1);
-    assert_near(first.volume, alone([22.0, 10.0, 10.0], 6.0), 1e-4);
-    assert_near(second.volume, alone([8.0, 10.0, 10.0], 5.0), 1e-4);
+    assert_near(first.volume(), alone([22.0, 10.0, 10.0], 6.0), 1e-4);
+    assert_near(second.volume(), alone([8.0, 10.0, 10.0], 5.0), 1e-4);
     assert_near(sum(&targets), ball_volume(6.0) + ball_volume(5.0), 0.02);
     assert!(length(sub(first.place, [22.0, 10.0, 10.0])) < 0.1 && length(sub(second.place, [8.0, 10.0, 10.0])) < 0.1);
 }
@@ -71,12 +74,12 @@ fn bubbles_belong_to_the_piece_around_them_and_drops_in_them_do_not() {
     assert_near(sum(&targets), alone(9.0) - alone(6.0), 1e-3);
 
     let (mut surface, mut targets) = start([24; 3], move |p| shell(p).min(ball(centre, 3.0)(p)));
-    let (shell, drop) = (targets.pieces()[0].volume, targets.pieces()[1].volume);
+    let (shell, drop) = (targets.pieces()[0].volume(), targets.pieces()[1].volume());
     assert_near(drop, alone(3.0), 5e-3);
     targets.add(0.02 * shell, Some([12.0, 12.0, 19.5]));
     let report = targets.correct(&mut surface, None);
     assert!(report.worst < 1e-4 * shell && report.pieces == 2, "{report:?}");
-    assert_eq!(targets.pieces()[1].volume, drop);
+    assert_eq!(targets.pieces()[1].volume(), drop);
     let along: Vec<f32> = surface.mesh(None).points.iter().map(|p| length(sub(*p, centre))).collect();
     assert!(along.iter().any(|r| *r > 9.02) && along.iter().all(|r| *r < 5.99 || *r > 9.01), "{along:?}");
 }
@@ -105,7 +108,7 @@ fn a_ball_that_splits_shares_its_target() {
     assert!(report.worst < 1e-3 * whole && report.drift.abs() < 1e-3, "{report:?}");
     // Raw: the flow pinches the middle to nothing.
     assert!(report.raw_drift < -0.1, "{report:?}");
-    let shares: Vec<f64> = targets.pieces().iter().map(|piece| piece.volume / whole).collect();
+    let shares: Vec<f64> = targets.pieces().iter().map(|piece| piece.volume() / whole).collect();
     assert!(shares.iter().all(|share| *share > 0.2), "{shares:?}");
 }
 
@@ -132,7 +135,7 @@ fn a_piece_that_vanishes_is_lost_with_its_volume() {
     let two = |p: Vec3| ball(centre, 1.6)(p).min(ball([21.0, 8.0, 8.0], 5.0)(p));
     let shrink = flow(size, |p| if p[0] < 12.0 { scale(sub(p, centre), -0.95) } else { [0.0; 3] });
     let (mut surface, mut targets) = start(size, two);
-    let small = targets.pieces()[1].volume;
+    let small = targets.pieces()[1].volume();
     let mut sunk = (surface.clone(), targets.clone());
     step(&mut surface, &shrink, 7.0);
     let report = targets.correct(&mut surface, None);
@@ -162,15 +165,15 @@ fn what_fills_a_box_is_not_lost() {
 fn what_is_added_goes_where_it_is_or_everywhere() {
     let two = |p: Vec3| ball([8.0, 10.0, 10.0], 5.0)(p).min(ball([22.0, 10.0, 10.0], 6.0)(p));
     let (mut surface, mut targets) = start([32, 20, 20], two);
-    let [large, small] = [0, 1].map(|piece| targets.pieces()[piece].volume);
+    let [large, small] = [0, 1].map(|piece| targets.pieces()[piece].volume());
     targets.add(20.0, Some([8.0, 14.0, 10.0]));
     targets.correct(&mut surface, None);
-    assert_eq!([0, 1].map(|piece| targets.pieces()[piece].volume), [large, small + 20.0]);
+    assert_eq!([0, 1].map(|piece| targets.pieces()[piece].volume()), [large, small + 20.0]);
     targets.add(-0.1 * (large + small + 20.0), None);
     // Far from both: it waits.
     targets.add(5.0, Some([16.0, 0.5, 0.5]));
     targets.correct(&mut surface, None);
-    let [a, b] = [0, 1].map(|piece| targets.pieces()[piece].volume);
+    let [a, b] = [0, 1].map(|piece| targets.pieces()[piece].volume());
     assert_near(a, 0.9 * large, 1e-12);
     assert_near(b, 0.9 * (small + 20.0), 1e-12);
     assert_eq!(targets.waiting(), 5.0);
@@ -188,7 +191,7 @@ fn what_waits_is_taken_over_and_what_is_owed_forgiven() {
     targets.add(-(whole + 1.5), Some([5.0; 3]));
     targets.correct(&mut surface, None);
     assert_near(targets.forgive(), 1.5, 1e-9);
-    assert_eq!(targets.take_waiting(), [LostPiece { volume: 2.0, place: [14.0; 3] }]);
+    assert_eq!(targets.take_waiting(), [LostPiece { volume: 2.0, phase: 0, place: [14.0; 3] }]);
     assert!(targets.waiting() == 0.0 && targets.target() < 1e-9);
 }
 
@@ -201,7 +204,7 @@ fn surfaces_move_by_parts_of_solver_cells() {
         targets.add(144.0, None);
         let mut before = targets.volume();
         for (way, moved) in [(0.0, CAP), (1.0, CAP), (2.0, 0.2), (100.0, 1.0 / f64::from(resolution).max(2.0))] {
-            let report = targets.correct_within(&mut surface, None, cap(way));
+            let report = targets.correct_within(&mut surface, None, None, cap(way));
             assert!((report.moved / moved - 1.0).abs() < 0.02, "{resolution} {way}: {report:?}");
             assert_near(report.volume - before, 144.0 * moved, 0.05);
             before = report.volume;
@@ -263,8 +266,8 @@ fn assert_kept((mut liquid, mut targets): (Liquid<MarkedSurface>, VolumeTargets)
         last = frame(&mut liquid, &mut targets);
         lost += last.lost.iter().map(|piece| piece.volume).sum::<f64>();
         assert_near(last.target + lost, whole, 1e-12);
-        let resolved = targets.pieces().iter().filter(|piece| piece.volume > 20.0 * CELL * CELL * CELL);
-        let error = resolved.map(|piece| (piece.measured / piece.volume - 1.0).abs()).fold(0.0, f64::max);
+        let resolved = targets.pieces().iter().filter(|piece| piece.volume() > 20.0 * CELL * CELL * CELL);
+        let error = resolved.map(|piece| (piece.measured / piece.volume() - 1.0).abs()).fold(0.0, f64::max);
         if error > 1e-3 {
             // The frame lost more than a surface may move.
             assert!(last.moved > 0.9 * CAP, "{n}: {error} {last:?}");
@@ -351,8 +354,68 @@ fn bits_do_not_depend_on_threads_nor_on_saving() {
 /// Liquid too fast to be followed is found again, but no more than was lost.
 #[test]
 fn pieces_of_unknown_origin_have_what_was_lost() {
-    let lost_piece = |volume: f64| LostPiece { volume, place: [0.0; 3] };
-    let (mut lost, mut shares) = ([lost_piece(2.0), lost_piece(3.0)], vec![7.0, 0.0, 0.0]);
+    let lost_piece = |volume: f64| LostPiece { volume, phase: 0, place: [0.0; 3] };
+    let (mut lost, mut shares) = ([lost_piece(2.0), lost_piece(3.0)], vec![vec![7.0, 0.0, 0.0]]);
     find_again(&[1, 2], &[7.0, 1.5, 9.0], &mut lost, &mut shares);
-    assert_eq!((shares, lost.map(|piece| piece.volume)), (vec![7.0, 1.5, 3.5], [0.0, 0.0]));
+    assert_eq!((shares, lost.map(|piece| piece.volume)), (vec![vec![7.0, 1.5, 3.5]], [0.0, 0.0]));
+}
+
+/// Of a pool 5 m deep, the left half of which is of another phase, that half sinks by a tenth: it alone rises again, and what
+/// the other half gained meanwhile is not taken from it.
+#[test]
+fn a_phase_that_lost_volume_has_it_back() {
+    let size = [20; 3];
+    let mut surface = MarkedSurface::new(Domain::closed([0; 3], size), 1, |p| p[1] - 5.0, 0, 1);
+    let phase = |p: Vec3| LiquidMaterial { phase: u32::from(p[0] < 10.0), ..LiquidMaterial::default() };
+    let mut materials = MaterialPoints::filling(&surface.view(), phase);
+    let mut targets = VolumeTargets::of_parts(&mut surface, 1.0, None, Some(&mut materials), &[]);
+    let halves: Vec<f64> = targets.pieces()[0].phases.clone();
+    assert_near(halves[0], 1000.0, 1e-3);
+    assert_near(halves[1], 1000.0, 1e-3);
+    let sunk = |p: Vec3| [0.0, -0.1 * (10.5 - p[0]).clamp(0.0, 1.0), 0.0];
+    step(&mut surface, &flow(size, sunk), 0.2);
+    let seen = targets.measure(&mut surface, None, Some(&materials.phases()));
+    assert_near(seen.phase_drift, 0.02, 0.06);
+    let fixed = targets.correct_within(&mut surface, None, Some(&mut materials), CAP);
+    assert!(fixed.phase_drift < 2e-3 && fixed.drift.abs() < 1e-4, "{fixed:?}");
+    let heights = |low: f32, high: f32| {
+        let markers = surface.markers().markers.iter().map(|marker| marker.point);
+        markers.filter(move |p| (low..high).contains(&p[0])).map(|p| p[1])
+    };
+    assert!(heights(1.0, 8.5).all(|y| (y - 5.0).abs() < 0.02) && heights(11.5, 19.0).all(|y| (y - 5.0).abs() < 0.01));
+}
+
+/// What goes is of the phases that lack it; beyond that, of each in proportion.
+#[test]
+fn what_goes_is_what_is_missing() {
+    let take = |there: [f64; 2], volume: f64| {
+        let (mut a, mut b) = (6.0, 4.0);
+        let rest = take_from(&mut [&mut a, &mut b], |phase| there[phase], -volume);
+        [a, b, rest]
+    };
+    assert_eq!(take([6.0, 3.0], 0.5), [6.0, 3.5, 0.0]);
+    assert_eq!(take([5.0, 3.0], 1.0), [5.5, 3.5, 0.0]);
+    assert_eq!(take([6.5, 4.0], 5.0), [3.0, 2.0, 0.0]);
+    assert_eq!(take([6.0, 2.0], 6.0), [3.0, 1.0, 0.0]);
+    assert_eq!(take([6.0, 4.0], 12.0), [0.0, 0.0, -2.0]);
+}
+
+/// Of a pool in halves of two phases, a layer of the one is taken over by the other: it has it back where they meet, and the
+/// surface stays where it is.
+#[test]
+fn a_phase_that_lost_its_place_to_another_has_it_back() {
+    let size = [20; 3];
+    let mut surface = MarkedSurface::new(Domain::closed([0; 3], size), 1, |p| p[1] - 5.0, 0, 1);
+    let halves = |at: f32| move |p: Vec3| LiquidMaterial { phase: u32::from(p[0] < at), ..LiquidMaterial::default() };
+    let mut materials = MaterialPoints::filling(&surface.view(), halves(10.0));
+    let mut targets = VolumeTargets::of_parts(&mut surface, 1.0, None, Some(&mut materials), &[]);
+    let mut materials = MaterialPoints::filling(&surface.view(), halves(9.0));
+    let seen = targets.measure(&mut surface, None, Some(&materials.phases()));
+    assert_near(seen.phase_drift, 0.1, 0.03);
+    let fixed = targets.correct_within(&mut surface, None, Some(&mut materials), CAP);
+    assert!(fixed.phase_drift < 2e-3 && fixed.moved == 0.0, "{fixed:?}");
+    for (point, material) in materials.points().iter().zip(materials.materials()) {
+        let expected = u32::from(point[0] < 10.0);
+        assert!(material.phase == expected || (point[0] - 10.0).abs() < 0.6, "{point:?} {material:?}");
+    }
 }

@@ -5,7 +5,7 @@ use numerics::vector::{length, sub};
 const FRAME: f64 = 1.0 / 24.0;
 
 fn of(viscosity: f32, density: f32) -> LiquidMaterial {
-    LiquidMaterial { viscosity: Some(viscosity), density: Some(density) }
+    LiquidMaterial { viscosity: Some(viscosity), density: Some(density), phase: 0 }
 }
 
 /// A liquid of two materials that touch and differ 10⁶ times in viscosity and twice in density falls as one.
@@ -102,7 +102,7 @@ fn layers_at_rest_stay_at_rest() {
         let mut liquid = Liquid::new(LiquidSettings::new(domain, 0.0625), PlainLevelSet::new(domain, |p| p[1] - 12.3));
         liquid.set_materials(|p| {
             if p[1] < 6.0 {
-                LiquidMaterial { density: Some(5000.0), viscosity: None }
+                LiquidMaterial { density: Some(5000.0), viscosity: None, phase: 0 }
             } else {
                 LiquidMaterial::default()
             }
