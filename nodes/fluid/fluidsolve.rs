@@ -29,6 +29,7 @@ mod particles;
 mod run;
 mod shapes;
 mod spray;
+mod start;
 
 choice! {
     /// How liquid is represented.

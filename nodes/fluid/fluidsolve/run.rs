@@ -19,8 +19,9 @@ use super::domain::{checks, domain, lattice, settings};
 use super::measured::{euler_characteristic, measured, pool_of};
 use super::openings::{Opening, SINK, SOURCE, Timed};
 use super::particles::particles;
-use super::shapes::{Colliders, in_cells, liquid_at_start};
+use super::shapes::{Colliders, in_cells};
 use super::spray::{Air, SprayDrop, gathered, rejoining};
+use super::start::liquid_at_start;
 use super::{
     CFL_REACHED, COLLECTING, DENSITY, EULER_CHARACTERISTIC, FAST_SHAPES, IN_COLLIDERS, INITIAL_SPIN, INITIAL_VELOCITY,
     LEFT_DOMAIN, LIQUID_CELLS, MADE_GOOD, MADE_GOOD_NOW, MATERIAL_DRIFT, MISWIRED, OUTSIDE, PARTICLES, PARTICLES_NOW,
