@@ -211,8 +211,8 @@ metrics! { METRICS:
     COLLIDER_FORCE_Z = Metric::new("collider_force_z", Unit::Newtons, "The same along z.");
     WITHHELD = Metric::new("withheld", Unit::CubicMetres,
         "Volume that the rates of sources and sinks asked for in the frame and that could not pass.")
-        .warn_above(1e-9, "Sources could not give, or sinks not take, what their rates ask for, most of it wire {withheld_wire} \
-            (counted from 0 through `sources`, then `sinks`): the liquid has nowhere to go, or there is none to take. Open a wall, \
+        .warn_above(1e-9, "Sources could not give, or sinks not take, what their rates ask for, most of it \
+            {sources+sinks:withheld_wire}: the liquid has nowhere to go, or there is none to take. Open a wall, \
             make room, or move the source or sink.");
     WITHHELD_WIRE = Metric::new("withheld_wire", Unit::None,
         "The wire of which most was withheld in the frame, counted from 0 through `sources`, then `sinks`.");

@@ -214,28 +214,27 @@ metrics! { METRICS:
     GOAL_MISS = Metric::new("goal_miss", Unit::None,
         "How near a body came to a goal while it should have had its shape: mean distance relative to the size of the \
          body. The largest of all goals so far; missing before the first.")
-        .warn_last_above(0.25, "`bodies` {goal_miss_body} never comes near `goals` {goal_miss_goal} (both counted from \
-            0): something is in the way, or the goal is too weak. Raise `strength` of Softbody_Goal, give the body more \
+        .warn_last_above(0.25, "{bodies:goal_miss_body} never comes near {goals:goal_miss_goal}: something is in the way, or the goal is too weak. Raise `strength` of Softbody_Goal, give the body more \
             frames to get there, or lower `stiffness`; see whether colliders, pins or the ground hold it back.");
     GOAL_MISS_BODY = Metric::new("goal_miss_body", Unit::None, "The wire of that body, from 0.");
     GOAL_MISS_GOAL = Metric::new("goal_miss_goal", Unit::None, "The wire of that goal, from 0.");
     IDLE_GOALS = Metric::new("idle_goals", Unit::None, "Goals that have no particle to pull.")
-        .warn_above(0.0, "`goals` {idle_goals_wire} (counted from 0) has no effect: its body has no particle of the kind \
+        .warn_above(0.0, "{goals:idle_goals_wire} has no effect: its body has no particle of the kind \
             that `goal_on` names. Make inner points with `interior` and a smaller `spacing` of Tetrahedralize, or set \
             `goal_on` to `all`.");
     IDLE_GOALS_WIRE = Metric::new("idle_goals_wire", Unit::None, "The first of these goals, from 0; −1 if there is none.");
     EARLY_GOALS = Metric::new("early_goals", Unit::None, "Goals that are over when the simulation starts.")
-        .warn_above(0.0, "`goals` {early_goals_wire} (counted from 0) is over when the simulation starts, so it does not \
+        .warn_above(0.0, "{goals:early_goals_wire} is over when the simulation starts, so it does not \
             pull. Give it a `frame` after the simulation's `start_frame`.");
     EARLY_GOALS_WIRE = Metric::new("early_goals_wire", Unit::None, "The first of these goals, from 0; −1 if there is none.");
     DOUBLED_GOALS = Metric::new("doubled_goals", Unit::None, "Goals at whose frame their body is still held by another goal.")
-        .warn_above(0.0, "At the `frame` of `goals` {doubled_goals_wire} (counted from 0) its body is still held by another \
+        .warn_above(0.0, "At the `frame` of {goals:doubled_goals_wire} its body is still held by another \
             goal, so it jumps from one to the other. Give each goal a `frame` after the `frame` and `hold` of the one \
             before it.");
     DOUBLED_GOALS_WIRE = Metric::new("doubled_goals_wire", Unit::None, "The first of these goals, from 0; −1 if there is none.");
     IDLE_PINS = Metric::new("idle_pins", Unit::None, "Pins with no particle within their `radius` at the start.")
-        .warn_above(0.0, "These pins hold nothing; the first is point {idle_pins_point} of `pins` {idle_pins_wire} (both \
-            counted from 0). Move them to the body at `start_frame`, or raise their `radius`.");
+        .warn_above(0.0, "These pins hold nothing; the first is point {idle_pins_point} (from 0) of \
+            {pins:idle_pins_wire}. Move them to the body at `start_frame`, or raise their `radius`.");
     IDLE_PINS_WIRE = Metric::new("idle_pins_wire", Unit::None, "The wire of the first of these pins, from 0; −1 if there is none.");
     IDLE_PINS_POINT = Metric::new("idle_pins_point", Unit::None, "The point of the first of these pins, from 0; −1 if there is none.");
     PINNED = Metric::new("pinned", Unit::None,
