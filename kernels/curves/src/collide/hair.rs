@@ -1,7 +1,8 @@
 //! One curve, root to tip.
 
 use super::crossing::{first_crossing, first_crossing_in};
-use super::segment_turn::{Nearby, Segment};
+use super::half_space::HalfSpace;
+use super::segment_turn::{Nearby, Segment, Turned};
 use super::{Collide, Reached, perpendicular};
 use nalgebra::Quaternion;
 use numerics::vector::{self, DQuat, DVec3, Vec3, to_f32, to_f64};
@@ -15,6 +16,8 @@ pub(super) struct Hair<'a> {
     pub(super) first: usize,
     /// Its displacement for `offset_root`.
     pub(super) shift: DVec3,
+    /// Where it meets nothing, if known.
+    pub(super) half_space: Option<&'a HalfSpace>,
     pub(super) rest: &'a [Vec3],
     pub(super) goal: &'a [Vec3],
     pub(super) out: &'a mut [Vec3],
@@ -127,7 +130,12 @@ impl Hair<'_> {
         nearby: &mut Nearby<'t>,
         reached: &mut Reached,
     ) -> DVec3 {
-        let mut turned = segment.turn(how.method, how.obstacles, nearby);
+        let mut turned = match self.half_space {
+            Some(half_space) if half_space.frees(&(to_f64(self.rest[0]) + self.shift), segment) => {
+                Turned { direction: segment.to, met: false, clear: true }
+            }
+            _ => segment.turn(how.method, how.obstacles, nearby),
+        };
         let mut end = segment.end(&turned.direction);
         if !turned.met && may_keep_goal && self.out[k] == self.goal[k] {
             end = self.goal[k + 1];

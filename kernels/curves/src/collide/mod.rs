@@ -13,6 +13,7 @@
 mod coherence;
 mod crossing;
 mod hair;
+mod half_space;
 mod rest;
 mod sector;
 mod segment_turn;
@@ -21,6 +22,7 @@ mod triangle_filter;
 
 use coherence::Ground;
 use hair::{Hair, Scratch};
+use half_space::HalfSpace;
 use numerics::masked::Masked;
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
@@ -139,6 +141,7 @@ pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how:
             &computed
         }
     };
+    let known = Known { at_rest, half_spaces: at_rest.used(path, starts, rest, how) };
     let mut points = vec![[0.0; 3]; goal.len()];
     let mut tasks = Vec::new();
     let mut left = &mut points[..];
@@ -154,11 +157,19 @@ pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how:
         (left, first) = (rest, end);
     }
     let reached =
-        parallel::map(tasks, |_, (curves, out)| collide_task(path, curves, starts, [rest, goal], how, at_rest, out));
+        parallel::map(tasks, |_, (curves, out)| collide_task(path, curves, starts, [rest, goal], how, known, out));
     let reached = reached.into_iter().fold(Reached::default(), Reached::and);
     let Reached { unfreed_segments, crossings_left, contacts, deepest_overlap, length_error } = reached;
     let started_inside = at_rest.inside();
     Collided { points, unfreed_segments, crossings_left, started_inside, contacts, deepest_overlap, length_error }
+}
+
+/// What is known of all curves at rest.
+#[derive(Clone, Copy)]
+struct Known<'a> {
+    at_rest: &'a AtRest,
+    /// One for each curve, or none.
+    half_spaces: &'a [HalfSpace],
 }
 
 kernel! {
@@ -167,7 +178,7 @@ kernel! {
         starts: &[u32],
         positions: [&[Vec3]; 2],
         how: &Collide<'_>,
-        at_rest: &AtRest,
+        known: Known<'_>,
         out: &mut [Vec3],
     ) -> Reached = task;
 }
@@ -178,7 +189,7 @@ fn task(
     starts: &[u32],
     [rest, goal]: [&[Vec3]; 2],
     how: &Collide<'_>,
-    at_rest: &AtRest,
+    Known { at_rest, half_spaces }: Known<'_>,
     out: &mut [Vec3],
 ) -> Reached {
     let mut scratch = Scratch::default();
@@ -189,6 +200,7 @@ fn task(
         let mut hair = Hair {
             first: cvs.start,
             shift: at_rest.shift(curve),
+            half_space: half_spaces.get(curve),
             rest: &rest[cvs.clone()],
             goal: &goal[cvs.clone()],
             out: &mut out[cvs.start - base..cvs.end - base],

@@ -1,8 +1,9 @@
 //! The surface that curves grow on: its outward normal, and heights above it.
 
 use super::coherence::Ground;
-use numerics::tree::{Closest, TriangleTree};
-use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
+use super::crossing::corners;
+use numerics::tree::{Closest, Cuboid, TriangleTree};
+use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
 
 /// Largest number of times that a root is lifted, as the surface may curve below it.
 const LIFTS: usize = 4;
@@ -43,6 +44,29 @@ impl SkinSurface<'_> {
         let mixed = (0..3)
             .fold(DVec3::zeros(), |sum, k| sum + to_f64(self.normals[corners[k] as usize]) * f64::from(at.weights[k]));
         mixed.try_normalize(1e-12)
+    }
+
+    /// The corners of the triangle nearest to a point, and the direction out of the surface there: that triangle's normal
+    /// if it lies along the interpolated one by a cosine above `same_side`, else the interpolated one.
+    #[inline(always)]
+    pub(super) fn facet(&self, p: &DVec3, same_side: f64) -> Option<(DVec3, [DVec3; 3])> {
+        let at = self.tree.closest(to_f32(*p), f32::INFINITY)?;
+        // The point found lies on its triangle up to rounding.
+        let slack = 4e-6 * (vector::largest(at.point) + at.distance);
+        let [low, high] = [-slack, slack].map(|slack| at.point.map(|x| x + slack));
+        let mut walk = self.tree.walk(Cuboid { low, high });
+        let corners = walk.find_map(|(block, _)| {
+            let block = &self.tree.blocks()[block];
+            let lane = block.triangle.iter().position(|triangle| *triangle == at.triangle)?;
+            Some(corners(block, lane))
+        })?;
+        let flat = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).try_normalize(0.0);
+        let flat = flat.filter(|normal| normal.iter().all(|x| x.is_finite()));
+        let up = match (flat, self.normal(&at)) {
+            (Some(flat), Some(smooth)) if flat.dot(&smooth) > same_side => flat,
+            (flat, smooth) => smooth.or(flat)?,
+        };
+        Some((up, corners))
     }
 
     /// Height of a point above the surface, negative inside, and the normal there.

@@ -6,6 +6,7 @@ use numerics::random::Key;
 use numerics::vector::{self, to_f64};
 
 mod hairs;
+mod kept;
 mod sectors;
 
 /// Whether the segment crosses the triangle, by solving for its point in the plane. Touching does not count.

@@ -6,7 +6,7 @@ use numerics::masked::Masked;
 const PLAIN: Masked<'static, f32> = Masked::uniform(0.0);
 const WHOLE: Masked<'static, f32> = Masked::uniform(1.0);
 
-fn on<'a>(obstacles: &'a [&'a TriangleTree]) -> Collide<'a> {
+pub(super) fn on<'a>(obstacles: &'a [&'a TriangleTree]) -> Collide<'a> {
     Collide {
         obstacles,
         skin: None,
