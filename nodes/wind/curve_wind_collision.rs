@@ -13,6 +13,8 @@
 //!   skin beforehand by a continuous map: on the bear, in wind that moves 0.50 % of all curves by more than a quarter
 //!   of their length in a frame, collision raises that to 1.07 %, and to 0.70 % at `coherence` 1
 //!   (tests/wind/coherence.rs).
+//! * A segment may be carried to where no turn about its CV frees it, which W leaves open. Then the whole curve is blended
+//!   towards rest, up to its first pose that crosses nothing.
 //! * `offset_scale` only raises segments that would lie lower: wind may lift fur off the skin.
 
 use std::sync::Arc;
@@ -72,17 +74,22 @@ params! { PARAMS:
          them out of the colliders. Lengths are kept at any value.").within(0.0, 1.0);
 }
 
+/// Number of a curve's segments that cross a collider.
+const UNFREED_SEGMENTS: Attr<i32> = Attr::element("unfreed");
+
 const OUT: Output = Output::like("curves", &CURVES, "The curves, bent around the colliders. Lengths are kept.");
 
 metrics! { METRICS:
     CROSSINGS_LEFT = Metric::new("crossings_left", Unit::None,
         "Segments of the output that cross a collider. Not counted while `blend` is 0.")
         .warn_above(0.0,
-        "These segments still reach into a collider. Either no turn about the CV before them frees them \
-         (`unfreed_segments`), because their roots lie deep in the skin or they are caught between two colliders; or \
-         they begin closer to it than `gap`. Raise `offset_root`, or start from curves that are clear of the \
-         colliders.");
-    UNFREED = Metric::new("unfreed_segments", Unit::None, "Segments that cross a collider and that no turn can free.");
+        "These segments still reach into a collider; `unfreed` of the output says on which curves, so that they can be \
+         seen and hidden. Either their curves cross a collider at rest and no turn frees them (`unfreed_segments`); or \
+         `blend` is below 1. Raise `offset_root`, or start from curves that are clear of the colliders.");
+    UNFREED = Metric::new("unfreed_segments", Unit::None,
+        "Segments that cross a collider and that no turn can free, of curves that cross one at rest too.");
+    BLENDED = Metric::new("blended_to_rest", Unit::None,
+        "Curves that turns alone did not free: they are blended towards rest up to their first pose without a crossing.");
     STARTED_INSIDE = Metric::new("started_inside", Unit::None, "Curves that cross a collider in their rest shape.")
         .warn_above(0.0, "These curves cross a collider before any wind blows, so there is no free position to start \
             from: they are turned outwards as far as possible. Clear them of the collider in their rest shape, raise \
@@ -96,23 +103,25 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Collision",
-    3,
+    4,
     "Keeps curves that are bent by wind out of colliders. Each segment, root to tip, turns from its rest direction \
      towards the direction that the wind gave it, until it touches a collider. Place this node after the wind, and \
-     wire the curves from before the wind into `rest`. Metrics count the segments that could not be freed.",
+     wire the curves from before the wind into `rest`. `unfreed` is the number of segments of each curve that still \
+     cross a collider.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
 .params(PARAMS)
 .outputs(&[&OUT])
 .reads(&[&P])
-.writes(&[&P])
+.writes(&[&P, &UNFREED_SEGMENTS])
 .metrics(METRICS)
 .neutral(|params, wires| match params {
     _ if wires.count(&COLLIDERS) + wires.count(&SKIN) == 0 => Some("neither `colliders` nor `skin` is wired"),
     _ if params.get(BLEND).value == 0.0 => Some("`blend` is 0"),
     _ => None,
 })
+.neutral_fills(&[Fill::always_int(UNFREED_SEGMENTS, 0)])
 .leaves_out(|params, _| {
     let mut left_out = Vec::new();
     if params.get(COHERENCE) == 0.0 {
@@ -162,11 +171,15 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let collided = collide(starts, rest.positions(), curves.positions(), &how);
     cx.publish(CROSSINGS_LEFT, collided.crossings_left as f64);
     cx.publish(UNFREED, collided.unfreed_segments as f64);
+    cx.publish(BLENDED, collided.blended_to_rest as f64);
     cx.publish(STARTED_INSIDE, collided.started_inside as f64);
     cx.publish(CONTACTS, collided.contacts as f64);
     cx.publish(DEEPEST, collided.deepest_overlap);
     cx.publish(LENGTH_ERROR, collided.length_error);
     curves.set(P, collided.points)?;
+    if cx.wants(UNFREED_SEGMENTS) {
+        curves.set(UNFREED_SEGMENTS, collided.crossings)?;
+    }
     Ok(OUT.with(curves))
 }
 

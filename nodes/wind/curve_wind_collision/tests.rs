@@ -86,3 +86,24 @@ fn any_offset_scale_is_finite_and_keeps_lengths() {
         assert_eq!(out.metrics["crossings_left"], 0.0, "{scale}");
     }
 }
+
+#[test]
+fn unfreed_counts_the_segments_of_each_curve_that_cross() {
+    // A box of 0.2 around the root of the first curve, whose segments are longer; the second one is outside.
+    let corner = |k: u32| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { 0.1 } else { -0.1 });
+    let faces = vec![0, 2, 3, 1, 4, 5, 7, 6, 0, 1, 5, 4, 2, 6, 7, 3, 0, 4, 6, 2, 1, 3, 7, 5];
+    let cube: Geometry = Component::mesh(vec![4; 6], faces, (0..8).map(corner).collect()).unwrap().into();
+    let curves = |along: [f32; 3]| -> Geometry {
+        let points = [0.0, 1.0, 2.0, 5.0, 6.0].map(|u| along.map(|x| x * u));
+        Component::curves(vec![3, 2], points.to_vec()).unwrap().into()
+    };
+    let scene = bench(&NODE).input(CURVES, curves([1.0, 0.0, 0.0])).input(REST, curves([0.0, 1.0, 0.0]));
+    let out = scene.input(COLLIDERS, cube).set(OFFSET_ROOT, 0.0).cook();
+    assert_eq!(out.curves().get(UNFREED_SEGMENTS), Some(&[1, 0][..]));
+    assert_eq!(
+        ["crossings_left", "unfreed_segments", "blended_to_rest"].map(|name| out.metrics[name]),
+        [1.0, 1.0, 0.0]
+    );
+    let out = laid_down().cook();
+    assert_eq!(out.curves().get(UNFREED_SEGMENTS), Some(&[0][..]));
+}

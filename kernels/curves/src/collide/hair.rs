@@ -28,6 +28,8 @@ pub(super) struct Hair<'a> {
 pub(super) struct Scratch<'t> {
     nearby: Nearby<'t>,
     goal: Vec<DVec3>,
+    /// Direction of each segment; zero where it has no length.
+    directions: Vec<DVec3>,
 }
 
 /// State passed from one segment to the next.
@@ -52,7 +54,8 @@ impl Hair<'_> {
         }
         let shift = self.shift;
         self.set_goals(how, &shift, &mut scratch.goal);
-        let Scratch { nearby, goal } = scratch;
+        let Scratch { nearby, goal, directions } = scratch;
+        directions.clear();
         if shift != DVec3::zeros() {
             self.out[0] = to_f32(goal[0]);
         }
@@ -63,6 +66,7 @@ impl Hair<'_> {
             let length = (to_f64(self.goal[k + 1]) - to_f64(self.goal[k])).norm();
             if length == 0.0 || along.norm() == 0.0 {
                 self.out[k + 1] = self.out[k];
+                directions.push(DVec3::zeros());
                 continue;
             }
             let wanted = along / along.norm();
@@ -73,6 +77,10 @@ impl Hair<'_> {
             let direction = self.turn(how, k, &segment, may_keep_goal, nearby, &mut reached);
             carried.rotation = smallest_rotation(&segment.from, &direction, &carried.axis) * carried.rotation;
             carried.before = direction;
+            directions.push(direction);
+        }
+        if reached.unfreed_segments > 0 && self.fall_back(how, directions) {
+            (reached.unfreed_segments, reached.deepest_overlap, reached.blended_to_rest) = (0, 0.0, 1);
         }
         reached.crossings_left = match self.blend(how, &shift) {
             false => reached.unfreed_segments,
@@ -114,9 +122,15 @@ impl Hair<'_> {
             length,
             half: 0.5 * f64::from(how.width.at(self.first + k)),
             gap: how.gap,
-            inner: if k == 0 && how.offset_root < how.gap { SKIPPED_GAPS * how.gap } else { 0.0 },
+            inner: self.untested(how, k),
             rounding,
         }
+    }
+
+    /// Length at the start of the segment from CV k that is not tested.
+    #[inline(always)]
+    pub(super) fn untested(&self, how: &Collide<'_>, k: usize) -> f64 {
+        if k == 0 && how.offset_root < how.gap { SKIPPED_GAPS * how.gap } else { 0.0 }
     }
 
     /// Turns the segment from CV k and writes its end; returns its direction.
@@ -228,7 +242,7 @@ impl Hair<'_> {
 }
 
 /// Spherical interpolation from one unit vector to another; through `axis` × `from` if they are opposite.
-fn part_way(from: &DVec3, to: &DVec3, axis: &DVec3, share: f64) -> DVec3 {
+pub(super) fn part_way(from: &DVec3, to: &DVec3, axis: &DVec3, share: f64) -> DVec3 {
     let turn = from.cross(to);
     let (sine, cosine) = (turn.norm(), from.dot(to));
     let n = if sine > 1e-9 { turn / sine } else { *axis };
