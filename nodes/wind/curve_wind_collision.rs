@@ -2,7 +2,7 @@
 //!
 //! W3. Root to tip, each segment starts from its rest direction, carried along by the turns of the segments before it,
 //! and turns towards the direction that the wind gave it until it meets a collider. A segment that an earlier turn has
-//! pushed into a collider is first turned out of it. `offset_root` lifts roots off the skin; `offset_scale` keeps
+//! pushed into a collider is first turned out of it. `offset_root` lifts roots off the skin, in creases off all faces; `offset_scale` keeps
 //! curves that the wind presses flat at a fraction of their rest height.
 //!
 //! Departures:
@@ -50,7 +50,8 @@ params! { PARAMS:
         segments stop closer to the contact, at proportionally higher cost.")
         .within(1.0, 1e6).soft(2.0, 64.0).when(|params| params.get(METHOD) == Method::Steps);
     OFFSET_ROOT: Param<f64> = Param::double("offset_root", 1e-4,
-        "How far outside the skin each root is moved, together with its curve. If this is less than `gap`, the \
+        "How far outside the skin each root is moved, together with its curve: in a crease this far from all its faces, if \
+         a move of 4 times this distance reaches that. If this is less than `gap`, the \
          beginning of a curve is not tested, because it touches the skin.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     OFFSET_SCALE: Param<f64> = Param::double("offset_scale", -1.0,
@@ -94,6 +95,9 @@ metrics! { METRICS:
         .warn_above(0.0, "These curves cross a collider before any wind blows, so there is no free position to start \
             from: they are turned outwards as far as possible. Clear them of the collider in their rest shape, raise \
             `offset_root`, or leave out that collider.");
+    LOW_ROOTS = Metric::new("low_roots", Unit::None,
+        "Roots in creases so narrow that a move of 4 times `offset_root` does not bring them that far from all faces. \
+         They are as far from them as such a move brings them.");
     CONTACTS = Metric::new("contacts", Unit::None,
         "Segments stopped by a collider before they reach the direction that the wind gave them.");
     DEEPEST = Metric::new("deepest_overlap", Unit::Metres,
@@ -173,6 +177,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     cx.publish(UNFREED, collided.unfreed_segments as f64);
     cx.publish(BLENDED, collided.blended_to_rest as f64);
     cx.publish(STARTED_INSIDE, collided.started_inside as f64);
+    cx.publish(LOW_ROOTS, collided.low_roots as f64);
     cx.publish(CONTACTS, collided.contacts as f64);
     cx.publish(DEEPEST, collided.deepest_overlap);
     cx.publish(LENGTH_ERROR, collided.length_error);

@@ -107,3 +107,27 @@ fn unfreed_counts_the_segments_of_each_curve_that_cross() {
     let out = laid_down().cook();
     assert_eq!(out.curves().get(UNFREED_SEGMENTS), Some(&[0][..]));
 }
+
+#[test]
+fn roots_in_creases_are_lifted_from_both_faces_or_counted() {
+    // A groove along z, its faces this much to both sides as they rise by 1; the root lies on its edge.
+    for (side, low) in [(1.0, 0.0), (0.4, 0.0), (0.2, 1.0)] {
+        let points = vec![
+            [0.0, 0.0, -1.0],
+            [0.0, 0.0, 1.0],
+            [side, 1.0, -1.0],
+            [side, 1.0, 1.0],
+            [-side, 1.0, -1.0],
+            [-side, 1.0, 1.0],
+        ];
+        let groove: Geometry = Component::mesh(vec![4, 4], vec![0, 1, 3, 2, 0, 4, 5, 1], points).unwrap().into();
+        let upright = curve(&[[0.0, 0.0, 0.0], [0.0, 0.5, 0.0]]);
+        let scene = bench(&NODE).input(CURVES, upright.clone()).input(REST, upright).input(COLLIDERS, groove);
+        let out = scene.set(OFFSET_ROOT, 0.01).cook();
+        let height = f64::from(out.curves().positions()[0][1]);
+        let slope = f64::from(side);
+        let sine = slope / (1.0 + slope * slope).sqrt();
+        assert!((height - (0.01 / sine).min(0.04)).abs() < 2e-4, "{side}: {height}");
+        assert_eq!(out.metrics["low_roots"], low, "{side}");
+    }
+}

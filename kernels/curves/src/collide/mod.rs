@@ -14,6 +14,7 @@ mod crossing;
 mod hair;
 mod half_space;
 mod rest;
+mod root_lift;
 mod sector;
 mod segment_turn;
 mod skin;
@@ -91,6 +92,8 @@ pub struct Collided {
     pub blended_to_rest: u64,
     /// Curves that cross something at rest.
     pub started_inside: u64,
+    /// Roots that a move of four times the root offset does not bring that far from all faces of the skin.
+    pub low_roots: u64,
     /// Segments stopped before their goal.
     pub contacts: u64,
     /// Largest distance by which a segment reaches through a surface, metres.
@@ -170,6 +173,7 @@ pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how:
         points,
         crossings,
         started_inside: at_rest.inside(),
+        low_roots: at_rest.low_roots(),
         unfreed_segments: reached.unfreed_segments,
         crossings_left: reached.crossings_left,
         blended_to_rest: reached.blended_to_rest,

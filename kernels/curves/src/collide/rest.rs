@@ -34,6 +34,8 @@ pub(super) struct Grown {
     pub(super) shift: DVec3,
     /// Whether it crosses something, displaced.
     pub(super) inside: bool,
+    /// Whether its root is nearer to the skin than that.
+    pub(super) low: bool,
 }
 
 /// Examines curves at rest. The result depends on `obstacles`, `skin` and `offset_root` of `how` only: keep it and pass
@@ -67,7 +69,8 @@ fn grow_task(starts: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut [Grow
             continue;
         }
         if let Some(skin) = &how.skin {
-            grown.shift = skin.lift(cvs[0], how.offset_root);
+            let lifted = skin.lift(cvs[0], how.offset_root);
+            (grown.shift, grown.low) = (lifted.shift, lifted.low);
         }
         grown.inside = crosses_any(cvs, &grown.shift, how, &mut nearby);
     }
@@ -149,6 +152,11 @@ impl AtRest {
     pub(super) fn half_spaces_found(&self) -> usize {
         let found = self.half_spaces.get().map_or(&[][..], Vec::as_slice);
         found.iter().filter(|found| **found != HalfSpace::default()).count()
+    }
+
+    /// Number of roots that are nearer to the skin than the root offset.
+    pub(super) fn low_roots(&self) -> u64 {
+        self.curves.iter().map(|curve| u64::from(curve.low)).sum()
     }
 
     /// The displacement of a curve.

@@ -5,9 +5,6 @@ use super::crossing::corners;
 use numerics::tree::{Closest, Cuboid, TriangleTree};
 use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
 
-/// Largest number of times that a root is lifted, as the surface may curve below it.
-const LIFTS: usize = 4;
-
 /// A skin: tree, triangles and normals of its points.
 #[derive(Clone, Copy)]
 pub struct SkinSurface<'a> {
@@ -46,20 +43,26 @@ impl SkinSurface<'_> {
         mixed.try_normalize(1e-12)
     }
 
+    /// The corners of the triangle of a point found.
+    #[inline(always)]
+    pub(super) fn corners(&self, at: &Closest) -> Option<[DVec3; 3]> {
+        // The point lies on its triangle up to rounding.
+        let slack = 4e-6 * (vector::largest(at.point) + at.distance);
+        let [low, high] = [-slack, slack].map(|slack| at.point.map(|x| x + slack));
+        let mut walk = self.tree.walk(Cuboid { low, high });
+        walk.find_map(|(block, _)| {
+            let block = &self.tree.blocks()[block];
+            let lane = block.triangle.iter().position(|triangle| *triangle == at.triangle)?;
+            Some(corners(block, lane))
+        })
+    }
+
     /// The corners of the triangle nearest to a point, and the direction out of the surface there: that triangle's normal
     /// if it lies along the interpolated one by a cosine above `same_side`, else the interpolated one.
     #[inline(always)]
     pub(super) fn facet(&self, p: &DVec3, same_side: f64) -> Option<(DVec3, [DVec3; 3])> {
         let at = self.tree.closest(to_f32(*p), f32::INFINITY)?;
-        // The point found lies on its triangle up to rounding.
-        let slack = 4e-6 * (vector::largest(at.point) + at.distance);
-        let [low, high] = [-slack, slack].map(|slack| at.point.map(|x| x + slack));
-        let mut walk = self.tree.walk(Cuboid { low, high });
-        let corners = walk.find_map(|(block, _)| {
-            let block = &self.tree.blocks()[block];
-            let lane = block.triangle.iter().position(|triangle| *triangle == at.triangle)?;
-            Some(corners(block, lane))
-        })?;
+        let corners = self.corners(&at)?;
         let flat = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).try_normalize(0.0);
         let flat = flat.filter(|normal| normal.iter().all(|x| x.is_finite()));
         let up = match (flat, self.normal(&at)) {
@@ -71,7 +74,7 @@ impl SkinSurface<'_> {
 
     /// Height of a point above the surface, negative inside, and the normal there.
     #[inline(always)]
-    fn height(&self, p: &DVec3, reach: f32) -> Option<(f64, DVec3)> {
+    pub(super) fn height(&self, p: &DVec3, reach: f32) -> Option<(f64, DVec3)> {
         let closest = self.tree.closest([p.x as f32, p.y as f32, p.z as f32], reach)?;
         let normal = self.normal(&closest)?;
         let away = p - to_f64(closest.point);
@@ -102,22 +105,5 @@ impl SkinSurface<'_> {
             Some((now, normal)) if now < scale * height => goal + normal * (scale * height - now),
             _ => *goal,
         }
-    }
-
-    /// The displacement that lifts a root to `offset` above the skin: zero if it is that high already.
-    #[inline(always)]
-    pub(super) fn lift(&self, root: Vec3, offset: f64) -> DVec3 {
-        let mut shift = DVec3::zeros();
-        if offset <= 0.0 {
-            return shift;
-        }
-        for _ in 0..LIFTS {
-            let Some((height, normal)) = self.height(&(to_f64(root) + shift), f32::INFINITY) else { break };
-            if height >= offset * 0.999 {
-                break;
-            }
-            shift += normal * (offset - height);
-        }
-        shift
     }
 }

@@ -7,11 +7,11 @@ use numerics::vector::to_f32;
 type Mesh = (Vec<Vec3>, Vec<[u32; 3]>);
 
 /// Fur on a mesh, at rest and blown.
-pub(super) struct Fur {
-    pub(super) mesh: Mesh,
-    pub(super) starts: Vec<u32>,
-    pub(super) rest: Vec<Vec3>,
-    pub(super) goal: Vec<Vec3>,
+pub(in crate::collide) struct Fur {
+    pub(in crate::collide) mesh: Mesh,
+    pub(in crate::collide) starts: Vec<u32>,
+    pub(in crate::collide) rest: Vec<Vec3>,
+    pub(in crate::collide) goal: Vec<Vec3>,
     /// The normal of the face under each curve.
     normals: Vec<DVec3>,
 }
@@ -132,7 +132,7 @@ pub(super) fn burr(curves: u64, long: f64) -> Fur {
     grown(body(24, radius), curves, long, 0.5)
 }
 
-pub(super) fn bodies() -> Vec<(&'static str, Fur)> {
+pub(in crate::collide) fn bodies() -> Vec<(&'static str, Fur)> {
     let sine = |x: f64| libm::sin(std::f64::consts::TAU * x);
     let mut thin = body(12, |_, _| 1.0);
     thin.0.iter_mut().for_each(|p| p[1] *= 1e-3);
