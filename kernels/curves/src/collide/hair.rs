@@ -205,11 +205,11 @@ impl Hair<'_> {
         goals.push(before + shift);
         for k in 1..self.goal.len() {
             let (from, to) = (to_f64(self.goal[k - 1]), to_f64(self.goal[k]));
-            let raised = skin.raised(self.rest[k], &to, scale);
-            // Lengths are restored root to tip: only the direction to the raised CV counts.
-            let along = raised - before;
+            // Lengths are kept root to tip: only the direction to the goal counts.
+            let along = to - before;
             let length = (to - from).norm();
-            before += if along.norm() > 0.0 { along * (length / along.norm()) } else { to - from };
+            let step = if along.norm() > 0.0 { along * (length / along.norm()) } else { to - from };
+            before += skin.raised(self.rest[k], &before, &step, scale).unwrap_or(step);
             goals.push(before + shift);
         }
     }

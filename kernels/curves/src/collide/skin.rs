@@ -2,8 +2,15 @@
 
 use super::coherence::Ground;
 use super::crossing::corners;
+use super::perpendicular;
 use numerics::tree::{Closest, Cuboid, TriangleTree};
 use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
+
+/// Largest number of turns that raise a segment.
+const TURNS: usize = 3;
+
+/// Share of the height wanted by which a raised CV may miss it.
+const HEIGHT_ERROR: f64 = 1e-3;
 
 /// A skin: tree, triangles and normals of its points.
 #[derive(Clone, Copy)]
@@ -90,20 +97,37 @@ impl SkinSurface<'_> {
         Some(Ground { normal, height: height.max(0.0) })
     }
 
-    /// A CV's goal, raised to `scale` times the CV's height above the skin at rest; unchanged if it is that high
-    /// already.
+    /// The step from a goal CV at `before` to the next one, turned so that its end is at `share` times the next CV's height
+    /// above the skin at rest; `None` if it is that high already.
+    ///
+    /// Turning changes the height by about the change of the step along the normal at its end: exact on a plane. Elsewhere
+    /// that is repeated.
     #[inline(always)]
-    pub(super) fn raised(&self, rest: Vec3, goal: &DVec3, scale: f64) -> DVec3 {
+    pub(super) fn raised(&self, rest: Vec3, before: &DVec3, step: &DVec3, share: f64) -> Option<DVec3> {
         let rest = to_f64(rest);
-        let Some((height, _)) = self.height(&rest, f32::INFINITY) else { return *goal };
+        let (height, _) = self.height(&rest, f32::INFINITY)?;
+        let (wanted, length) = (share * height, step.norm());
         // It cannot have come closer by more than its displacement.
-        let moved = (goal - rest).norm();
-        if height - moved >= scale * height {
-            return *goal;
+        let moved = (before + step - rest).norm();
+        if height - moved >= wanted {
+            return None;
         }
-        match self.height(goal, 2.0 * ((moved + height.abs()) as f32)) {
-            Some((now, normal)) if now < scale * height => goal + normal * (scale * height - now),
-            _ => *goal,
+        let reach = 2.0 * (moved + height.abs() + length) as f32;
+        let mut along = step.try_normalize(0.0)?;
+        for turn in 0..TURNS {
+            let Some((now, normal)) = self.height(&(before + along * length), reach) else { break };
+            if turn == 0 && now >= wanted {
+                return None;
+            }
+            if (now - wanted).abs() < HEIGHT_ERROR * wanted.abs() {
+                break;
+            }
+            let up = along.dot(&normal);
+            let rise = (up + (wanted - now) / length).clamp(-1.0, 1.0);
+            let level = (along - normal * up).try_normalize(1e-9);
+            let level = level.unwrap_or_else(|| perpendicular(&normal, &(rest - before)));
+            along = level * (1.0 - rise * rise).sqrt() + normal * rise;
         }
+        Some(along * length)
     }
 }
