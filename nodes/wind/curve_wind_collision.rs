@@ -58,6 +58,11 @@ params! { PARAMS:
         "Minimum height above the skin, relative to the height at rest: 1 keeps the volume of the coat, smaller values \
          let the wind press it down. Negative values turn this off.")
         .soft(-1.0, 1.0);
+    LOFT: Param<f64> = Param::double("loft", 0.0,
+        "Share of its height at rest, above the tangent plane of the skin at its root, that a CV keeps which the wind blows \
+         below it: a little keeps a coat from lying glued to the skin, and costs nothing. `coherence` scales it by \
+         1 − its own value. 0 is the paper's.")
+        .within(0.0, 1.0).when(|params| params.get(OFFSET_SCALE) < 0.0 && params.get(COHERENCE) < 1.0);
     GAP: Param<f64> = Param::double("gap", 1e-4,
         "Distance, along the arc of its turn, at which a segment stops before a contact.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
@@ -134,6 +139,9 @@ pub(crate) static NODE: Node = Node::new(
     if params.get(OFFSET_SCALE) < 0.0 {
         left_out.push(LeftOut::new("offset", "`offset_scale` is below 0"));
     }
+    if params.get(LOFT) == 0.0 {
+        left_out.push(LeftOut::new("loft", "`loft` is 0"));
+    }
     left_out
 });
 
@@ -162,6 +170,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         gap: cx.get(GAP),
         offset_root: cx.get(OFFSET_ROOT),
         offset_scale: Some(cx.get(OFFSET_SCALE)).filter(|scale| *scale >= 0.0),
+        loft: cx.get(LOFT),
         at_rest: None,
         blend: cx.mask(BLEND, &curves)?,
         width: cx.mask(WIDTH, &curves)?,
@@ -169,7 +178,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let starts = curves.runs().starts();
     // Computed once for still colliders and curves.
     let tree = skin.as_ref().map(|skin| skin.tree().clone());
-    let still = Still { obstacles: trees.clone(), skin: tree, offset: how.offset_root };
+    let still = Still { obstacles: trees.clone(), skin: tree, offset: how.offset_root, lofts: how.loft > 0.0 };
     let at_rest = rest.kept(still, || Ok(at_rest(starts, rest.positions(), &how)))?;
     how.at_rest = Some(&at_rest);
     let collided = collide(starts, rest.positions(), curves.positions(), &how);
@@ -193,6 +202,7 @@ struct Still {
     obstacles: Vec<Arc<TriangleTree>>,
     skin: Option<Arc<TriangleTree>>,
     offset: f64,
+    lofts: bool,
 }
 
 impl PartialEq for Still {
@@ -202,7 +212,7 @@ impl PartialEq for Still {
             && self.obstacles.iter().zip(&other.obstacles).all(same)
             && self.skin.iter().zip(&other.skin).all(same)
             && self.skin.is_some() == other.skin.is_some()
-            && self.offset == other.offset
+            && (self.offset, self.lofts) == (other.offset, other.lofts)
     }
 }
 

@@ -131,3 +131,17 @@ fn roots_in_creases_are_lifted_from_both_faces_or_counted() {
         assert_eq!(out.metrics["low_roots"], low, "{side}");
     }
 }
+
+#[test]
+fn loft_keeps_a_share_of_the_height_of_a_curve_blown_flat() {
+    let flat = || bench(&NODE).input(CURVES, curve(&[[0.0, 0.01, 0.0], [1.0, 0.01, 0.0]])).input(COLLIDERS, floor(0.0));
+    let blown = || flat().input(REST, curve(&[[0.0, 0.01, 0.0], [0.0, 1.01, 0.0]]));
+    for loft in [0.0, 0.1, 0.5] {
+        let out = blown().set(LOFT, loft).cook();
+        assert!((f64::from(out.curves().positions()[1][1]) - 0.01 - loft).abs() < 1e-6, "{loft}");
+    }
+    // `coherence` scales it, `offset_scale` replaces it.
+    let height = |bench: Bench| bench.cook().curves().positions()[1];
+    assert_eq!(height(blown().set(LOFT, 0.5).set(COHERENCE, 1.0)), height(blown().set(COHERENCE, 1.0)));
+    assert_eq!(height(blown().set(LOFT, 0.5).set(OFFSET_SCALE, 0.2)), height(blown().set(OFFSET_SCALE, 0.2)));
+}

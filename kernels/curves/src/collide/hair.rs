@@ -18,6 +18,8 @@ pub(super) struct Hair<'a> {
     pub(super) shift: DVec3,
     /// Where it meets nothing, if known.
     pub(super) half_space: Option<&'a HalfSpace>,
+    /// Direction out of the skin at its root; zero where unknown.
+    pub(super) up: DVec3,
     pub(super) rest: &'a [Vec3],
     pub(super) goal: &'a [Vec3],
     pub(super) out: &'a mut [Vec3],
@@ -193,14 +195,31 @@ impl Hair<'_> {
         cvs().all(|cv| cv.iter().all(|x| x.is_finite()))
     }
 
-    /// The CVs' goals: the input, or kept off the skin by `offset_scale` times their rest distance.
+    /// The CVs' goals: the input, or kept off the skin by a share of their rest heights.
     #[inline(always)]
-    fn set_goals(&self, how: &Collide<'_>, shift: &DVec3, goals: &mut Vec<DVec3>) {
+    pub(super) fn set_goals(&self, how: &Collide<'_>, shift: &DVec3, goals: &mut Vec<DVec3>) {
         goals.clear();
-        let (Some(scale), Some(skin)) = (how.offset_scale, &how.skin) else {
-            goals.extend(self.goal.iter().map(|cv| to_f64(*cv) + shift));
-            return;
-        };
+        let loft = how.loft * (1.0 - how.coherence);
+        match (how.offset_scale, &how.skin) {
+            (Some(scale), Some(skin)) => {
+                self.raise_goals(shift, goals, |k, before, step| skin.raised(self.rest[k], before, step, scale))
+            }
+            (None, _) if loft > 0.0 && self.up != DVec3::zeros() => {
+                self.raise_goals(shift, goals, |k, before, step| self.lofted(k, before, step, loft));
+            }
+            _ => goals.extend(self.goal.iter().map(|cv| to_f64(*cv) + shift)),
+        }
+    }
+
+    /// Goals from the root on, each segment replaced by what `raised` makes of its CV, the goal before it, and its step
+    /// towards its own goal.
+    #[inline(always)]
+    fn raise_goals(
+        &self,
+        shift: &DVec3,
+        goals: &mut Vec<DVec3>,
+        raised: impl Fn(usize, &DVec3, &DVec3) -> Option<DVec3>,
+    ) {
         let mut before = to_f64(self.goal[0]);
         goals.push(before + shift);
         for k in 1..self.goal.len() {
@@ -209,9 +228,26 @@ impl Hair<'_> {
             let along = to - before;
             let length = (to - from).norm();
             let step = if along.norm() > 0.0 { along * (length / along.norm()) } else { to - from };
-            before += skin.raised(self.rest[k], &before, &step, scale).unwrap_or(step);
+            before += raised(k, &before, &step).unwrap_or(step);
             goals.push(before + shift);
         }
+    }
+
+    /// The step to a goal CV, turned so that its end has a share of its rest height above the root's tangent plane; `None` if
+    /// it is that high.
+    #[inline(always)]
+    fn lofted(&self, k: usize, before: &DVec3, step: &DVec3, share: f64) -> Option<DVec3> {
+        let height = |at: &DVec3, root: Vec3| self.up.dot(&(at - to_f64(root)));
+        let wanted = share * height(&to_f64(self.rest[k]), self.rest[0]);
+        let now = height(before, self.goal[0]);
+        let length = step.norm();
+        if wanted <= 0.0 || length == 0.0 || now + self.up.dot(step) >= wanted {
+            return None;
+        }
+        let rise = ((wanted - now) / length).clamp(-1.0, 1.0);
+        let level = (step - self.up * self.up.dot(step)).try_normalize(1e-9 * length);
+        let rest = || perpendicular(&self.up, &(to_f64(self.rest[k]) - to_f64(self.rest[k - 1])));
+        Some((level.unwrap_or_else(rest) * (1.0 - rise * rise).sqrt() + self.up * rise) * length)
     }
 
     /// Turns each segment back towards its goal by 1 − `blend`; returns whether any turned.

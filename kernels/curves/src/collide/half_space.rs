@@ -16,7 +16,7 @@ const ROUNDING: f64 = 5e-7;
 
 /// Cosine of the angle between the facet under a root and the smooth normal up to which the facet's normal is taken. It
 /// is preferred because the smooth one tilts: along it the root's own facet rises beside the root.
-const SAME_SIDE: f64 = 0.8;
+pub(super) const SAME_SIDE: f64 = 0.8;
 
 /// 1 + the cosine of a turn close to half a turn, whose plane rounding decides.
 const OPPOSITE: f64 = 0.01;

@@ -60,6 +60,9 @@ pub struct Collide<'a> {
     pub offset_root: f64,
     /// Raises goals to at least this multiple of the curves' height above the skin at rest.
     pub offset_scale: Option<f64>,
+    /// Share of its height at rest, above the root's tangent plane, that a CV's goal keeps, 0..1; scaled by
+    /// 1 − `coherence`, and not used with `offset_scale`.
+    pub loft: f64,
     /// The result of [`at_rest`] for the same curves, if known.
     pub at_rest: Option<&'a AtRest>,
     /// Fraction of each segment's collision response that is kept, 0..1.
@@ -226,6 +229,7 @@ fn task(
             first: cvs.start,
             shift: at_rest.shift(curve),
             half_space: half_spaces.get(curve),
+            up: at_rest.up(curve),
             rest: &rest[cvs.clone()],
             goal: &goal[cvs.clone()],
             out: &mut out.points[cvs.start - base..cvs.end - base],

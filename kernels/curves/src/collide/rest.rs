@@ -2,7 +2,7 @@
 
 use super::Collide;
 use super::crossing::first_crossing;
-use super::half_space::HalfSpace;
+use super::half_space::{HalfSpace, SAME_SIDE};
 use super::segment_turn::{Nearby, gather};
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
@@ -36,10 +36,12 @@ pub(super) struct Grown {
     pub(super) inside: bool,
     /// Whether its root is nearer to the skin than that.
     pub(super) low: bool,
+    /// Direction out of the skin at its root; zero without `loft`.
+    pub(super) up: DVec3,
 }
 
-/// Examines curves at rest. The result depends on `obstacles`, `skin` and `offset_root` of `how` only: keep it and pass
-/// it in [`Collide::at_rest`] while these and the curves do not change.
+/// Examines curves at rest. The result depends on `obstacles`, `skin` and `offset_root` of `how`, and on whether its
+/// `loft` is 0: keep it and pass it in [`Collide::at_rest`] while these and the curves do not change.
 ///
 /// # Panics
 /// As [`super::collide()`].
@@ -71,6 +73,9 @@ fn grow_task(starts: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut [Grow
         if let Some(skin) = &how.skin {
             let lifted = skin.lift(cvs[0], how.offset_root);
             (grown.shift, grown.low) = (lifted.shift, lifted.low);
+            if how.loft > 0.0 {
+                grown.up = skin.facet(&to_f64(cvs[0]), SAME_SIDE).map_or(DVec3::zeros(), |(up, _)| up);
+            }
         }
         grown.inside = crosses_any(cvs, &grown.shift, how, &mut nearby);
     }
@@ -157,6 +162,11 @@ impl AtRest {
     /// Number of roots that are nearer to the skin than the root offset.
     pub(super) fn low_roots(&self) -> u64 {
         self.curves.iter().map(|curve| u64::from(curve.low)).sum()
+    }
+
+    /// The direction out of the skin at a curve's root; zero where unknown.
+    pub(super) fn up(&self, curve: usize) -> DVec3 {
+        self.curves[curve].up
     }
 
     /// The displacement of a curve.

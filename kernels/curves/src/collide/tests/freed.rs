@@ -58,7 +58,15 @@ fn a_curve_is_blended_to_its_first_free_pose_towards_rest() {
     let (rest, goal) = ([[0.0, 0.1, 0.0], [0.0, 1.1, 0.0]], [[0.0, 0.1, 0.0], [1.0, 0.1, 0.0]]);
     let down = DVec3::new(1.0, -1.0, 0.0).normalize();
     let mut out = goal;
-    let mut hair = Hair { first: 0, shift: DVec3::zeros(), half_space: None, rest: &rest, goal: &goal, out: &mut out };
+    let mut hair = Hair {
+        first: 0,
+        shift: DVec3::zeros(),
+        half_space: None,
+        up: DVec3::zeros(),
+        rest: &rest,
+        goal: &goal,
+        out: &mut out,
+    };
     assert!(hair.fall_back(&how, &[down]));
     let turned = |tip: Vec3| libm::atan2(f64::from(tip[0]), f64::from(tip[1]) - 0.1);
     let share = turned(out[1]) / 135_f64.to_radians();
@@ -67,7 +75,15 @@ fn a_curve_is_blended_to_its_first_free_pose_towards_rest() {
     // Where rest crosses too, nothing is done.
     let rest = [[0.0, 0.1, 0.0], [0.0, -0.9, 0.0]];
     let mut out = goal;
-    let mut hair = Hair { first: 0, shift: DVec3::zeros(), half_space: None, rest: &rest, goal: &goal, out: &mut out };
+    let mut hair = Hair {
+        first: 0,
+        shift: DVec3::zeros(),
+        half_space: None,
+        up: DVec3::zeros(),
+        rest: &rest,
+        goal: &goal,
+        out: &mut out,
+    };
     assert!(!hair.fall_back(&how, &[down]));
     assert_eq!(out, goal);
 }

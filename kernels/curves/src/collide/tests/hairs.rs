@@ -14,6 +14,7 @@ pub(super) fn on<'a>(obstacles: &'a [&'a TriangleTree]) -> Collide<'a> {
         gap: 1e-4,
         offset_root: 1e-4,
         offset_scale: None,
+        loft: 0.0,
         coherence: 0.0,
         at_rest: None,
         blend: WHOLE,

@@ -104,6 +104,7 @@ impl Fur {
             gap: scale * pick(0, [1e-4, 0.0, 1e-2]),
             offset_root: scale * pick(1, [1e-4, 0.0, 2e-2]),
             offset_scale: Some(0.5).filter(|_| settings % 5 == 4),
+            loft: if settings % 5 == 3 { 0.2 } else { 0.0 },
             coherence: pick(2, [0.0, 0.0, 1.0]),
             at_rest: None,
             blend: Masked::uniform(1.0),
