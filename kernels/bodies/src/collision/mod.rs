@@ -179,7 +179,7 @@ impl CollisionScene<'_> {
     fn on_ground(&self, query: &ContactQuery<'_>, out: &mut Vec<FoundContact>) {
         let Some(ground) = self.ground else { return };
         let up = DVec3::from(ground.up);
-        for particle in self.skins.iter().flat_map(|skin| &skin.surface.vertices) {
+        for particle in self.skins.iter().flat_map(|skin| &skin.touching) {
             let height = |x: &[[f64; 3]]| up.dot(&DVec3::from(x[*particle as usize])) - ground.height;
             if height(query.from).min(height(query.to)) <= REACH * ground.thickness {
                 let contact = Contact {
@@ -225,7 +225,7 @@ impl CollisionScene<'_> {
         let obstacle_poses: Vec<Positions<'_>> = obstacle_poses.iter().map(Vec::as_slice).collect();
         let still_boxes = swept::swept_boxes(&obstacle_poses);
         let tree = obstacle.faces.sweep(&still_boxes, rules.reach);
-        if !swept::overlap(&faces.bounds, &tree.bounds) {
+        if !swept::overlap(&swept::bounds_of_finite(&skin.touching, boxes), &tree.bounds) {
             return;
         }
         let between = poses_between(query, &times);
@@ -243,7 +243,7 @@ impl CollisionScene<'_> {
             still: MovingSurface { surface: &obstacle.surface, poses: &obstacle_poses },
             rules,
         };
-        meeting.vertices(&tree, out);
+        meeting.particles(&tree, out);
         meeting.points(faces, out);
         meeting.edges(out);
     }
@@ -298,35 +298,35 @@ fn path_of(poses: &[Positions<'_>], point: u32, path: &mut Vec<DVec3>) {
 }
 
 impl SkinObstaclePair<'_> {
-    /// Vertices of the skin against triangles of the obstacle.
-    fn vertices(&self, tree: &BoxTree<'_>, out: &mut Vec<FoundContact>) {
-        // A vertex may be inside anywhere within the bounds; only closed obstacles have an inside.
+    /// Particles of the skin against triangles of the obstacle.
+    fn particles(&self, tree: &BoxTree<'_>, out: &mut Vec<FoundContact>) {
+        // A particle may be inside anywhere within the bounds; only closed obstacles have an inside.
         let (solid, bounds) = (OnceLock::new(), tree.bounds);
         let has_inside = self.obstacle.surface.closed;
-        let find_in = |(): &mut (), vertices: &[u32], out: &mut Vec<FoundContact>| {
+        let find_in = |(): &mut (), particles: &[u32], out: &mut Vec<FoundContact>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
-            for vertex in vertices.iter().filter(|vertex| !self.released.has_particle(**vertex)) {
-                tree.overlapping(&self.boxes[0][*vertex as usize], &mut faces);
-                let own = &self.boxes[0][*vertex as usize];
+            for particle in particles.iter().filter(|particle| !self.released.has_particle(**particle)) {
+                tree.overlapping(&self.boxes[0][*particle as usize], &mut faces);
+                let own = &self.boxes[0][*particle as usize];
                 if faces.is_empty() && !(has_inside && swept::overlap(own, &bounds)) {
                     continue;
                 }
-                path_of(self.body.poses, *vertex, &mut path);
+                path_of(self.body.poses, *particle, &mut path);
                 let start = path[0];
                 hits.clear();
                 let closest_at_start = || self.closest_at_start(&solid, &bounds, start);
                 vertex::hits(&path, &self.still, &faces, &closest_at_start, &self.rules, &mut hits);
                 for hit in &hits {
                     let corners = self.obstacle.surface.triangles[hit.face as usize];
-                    let first = ([*vertex, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]);
+                    let first = ([*particle, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]);
                     out.extend(self.contact(first, (&corners, &hit.weights), hit.normal, hit.shift));
                 }
             }
         };
-        collect_in_order(&self.skin.surface.vertices, &find_in, out);
+        collect_in_order(&self.skin.touching, &find_in, out);
     }
 
-    /// The closest triangle at the start of the motion, for a vertex within the `bounds` of the obstacle; `solid`
+    /// The closest triangle at the start of the motion, for a particle within the `bounds` of the obstacle; `solid`
     /// holds its triangles at that time, built on first use.
     fn closest_at_start(&self, solid: &OnceLock<TriangleTree>, bounds: &Cuboid, start: DVec3) -> Option<ClosestPoint> {
         let p = to_f32(start);

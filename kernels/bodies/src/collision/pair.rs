@@ -44,7 +44,7 @@ struct Marks {
 impl Marks {
     fn put(&mut self, skin: &BodySkin, particles: &[u32]) {
         if self.of.is_empty() || self.last == u32::MAX {
-            self.of = vec![0; skin.particles()];
+            self.of = vec![0; skin.len()];
             self.last = 0;
         }
         self.last += 1;
@@ -60,6 +60,8 @@ impl Marks {
 
 /// Swept boxes of a skin.
 struct Boxes<'a> {
+    /// Bounds of all its particles.
+    bounds: Cuboid,
     faces: BoxTree<'a>,
     edges: BoxTree<'a>,
 }
@@ -68,8 +70,12 @@ impl CollisionScene<'_> {
     /// All pairs of skins, then each skin with itself.
     pub(super) fn pairs(&self, query: &ContactQuery<'_>, points: &[Cuboid], out: &mut Vec<FoundContact>) {
         let boxes = |reach: f64| -> Vec<Boxes<'_>> {
-            let faces = self.skins.iter().map(|skin| skin.faces.sweep(points, reach));
-            faces.zip(self.skins).map(|(faces, skin)| Boxes { faces, edges: skin.edges.sweep(points, reach) }).collect()
+            let of = self.skins.iter().map(|skin| Boxes {
+                bounds: swept::inflated(&swept::bounds_of_finite(&skin.touching, points), reach),
+                faces: skin.faces.sweep(points, reach),
+                edges: skin.edges.sweep(points, reach),
+            });
+            of.collect()
         };
         let pair = |skins: [usize; 2], self_contact: bool, params: ContactParams| Pair {
             scene: self,
@@ -84,9 +90,9 @@ impl CollisionScene<'_> {
             let boxes = boxes(REACH * params.thickness);
             for second in 1..self.skins.len() {
                 for first in 0..second {
-                    if swept::overlap(&boxes[first].faces.bounds, &boxes[second].faces.bounds) {
-                        pair([first, second], false, params).vertices(&boxes[second], out);
-                        pair([second, first], false, params).vertices(&boxes[first], out);
+                    if swept::overlap(&boxes[first].bounds, &boxes[second].bounds) {
+                        pair([first, second], false, params).particles(&boxes[second], out);
+                        pair([second, first], false, params).particles(&boxes[first], out);
                         pair([first, second], false, params).edges(&boxes[second], out);
                     }
                 }
@@ -95,7 +101,7 @@ impl CollisionScene<'_> {
         if let Some(params) = self.self_contact {
             for (skin, boxes) in boxes(REACH * params.thickness).iter().enumerate() {
                 let pair = pair([skin, skin], true, params);
-                pair.vertices(boxes, out);
+                pair.particles(boxes, out);
                 pair.edges(boxes, out);
             }
         }
@@ -103,34 +109,35 @@ impl CollisionScene<'_> {
 }
 
 impl Pair<'_> {
-    /// Vertices of the first skin against triangles of the second.
-    fn vertices(&self, boxes: &Boxes<'_>, out: &mut Vec<FoundContact>) {
+    /// Particles of the first skin against triangles of the second; of the same skin only those of its surface.
+    fn particles(&self, boxes: &Boxes<'_>, out: &mut Vec<FoundContact>) {
         let poses = [self.query.from, self.query.to];
         let [first, second] = self.skins;
         let on = MovingSurface { surface: &second.surface, poses: &poses };
-        let find_in = |marks: &mut Marks, vertices: &[u32], out: &mut Vec<FoundContact>| {
+        let find_in = |marks: &mut Marks, particles: &[u32], out: &mut Vec<FoundContact>| {
             let (mut faces, mut hits) = (Vec::new(), Vec::new());
-            for vertex in vertices {
-                boxes.faces.overlapping(&self.points[*vertex as usize], &mut faces);
+            for particle in particles {
+                boxes.faces.overlapping(&self.points[*particle as usize], &mut faces);
                 if self.self_contact {
-                    marks.put(first, &[*vertex]);
+                    marks.put(first, &[*particle]);
                     faces.retain(|face| !marks.have(&first.surface.triangles[*face as usize]));
                 }
                 if faces.is_empty() {
                     continue;
                 }
                 hits.clear();
-                let path = poses.map(|pose| DVec3::from(pose[*vertex as usize]));
+                let path = poses.map(|pose| DVec3::from(pose[*particle as usize]));
                 vertex::hits(&path, &on, &faces, &|| None, &self.rules, &mut hits);
                 for hit in &hits {
                     let [a, b, c] = second.surface.triangles[hit.face as usize];
                     let [u, v, w] = hit.weights;
-                    let gap = self.gap(|| first.rest_to_face(*vertex, hit.face));
-                    out.extend(self.contact([*vertex, a, b, c], [1.0, -u, -v, -w], hit.normal, hit.shift, gap));
+                    let gap = self.gap(|| first.rest_to_face(*particle, hit.face));
+                    out.extend(self.contact([*particle, a, b, c], [1.0, -u, -v, -w], hit.normal, hit.shift, gap));
                 }
             }
         };
-        collect_in_order(&first.surface.vertices, &find_in, out);
+        let particles = if self.self_contact { &first.surface.vertices } else { &first.touching };
+        collect_in_order(particles, &find_in, out);
     }
 
     /// Edges of the first skin against those of the second.

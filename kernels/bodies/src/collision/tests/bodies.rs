@@ -5,12 +5,12 @@ use crate::mass_spring::{BodySolver, Material, Mesh, SoftBody, SolverFrame, Stat
 use crate::tets::{boundary, cubes};
 use numerics::masked::Masked;
 
-const FRAME: f64 = 1.0 / 24.0;
+pub(super) const FRAME: f64 = 1.0 / 24.0;
 
-type Block = (Vec<[f64; 3]>, Vec<[u32; 4]>, Vec<[u32; 3]>);
+pub(super) type Block = (Vec<[f64; 3]>, Vec<[u32; 4]>, Vec<[u32; 3]>);
 
 /// A block of cubes of `side` with its lowest corner at `at`: particles, tets, and outward surface triangles.
-fn block(cells: [usize; 3], side: f64, at: [f64; 3]) -> Block {
+pub(super) fn block(cells: [usize; 3], side: f64, at: [f64; 3]) -> Block {
     let (points, tets) = cubes(cells, at, cells.map(|n| side * n as f64));
     let narrow: Vec<_> = points.iter().map(|p| p.map(|x| x as f32)).collect();
     let outer = boundary(&tets, &narrow).iter().map(|face| face.corners).collect();
@@ -57,7 +57,7 @@ fn fastest(state: &State) -> f64 {
     state.velocities.iter().map(|v| DVec3::from(*v).norm()).fold(0.0, f64::max)
 }
 
-const THICKNESS: f64 = 1e-3;
+pub(super) const THICKNESS: f64 = 1e-3;
 
 /// A pin that rolls ten thicknesses a frame, 1 cm deep in the block of [`rolled_over`].
 fn rolling(frame: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {

@@ -6,6 +6,7 @@ use numerics::shapes;
 
 mod bodies;
 mod hand;
+mod soft;
 mod tunnelling;
 
 fn pose(share: f64, positions: &[[f64; 3]]) -> ObstaclePose {
