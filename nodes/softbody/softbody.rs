@@ -207,6 +207,10 @@ metrics! { METRICS:
         "By how much `deepest_overlap` exceeds `thickness`: how far surfaces went through each other.")
         .warn_above(0.0, "Surfaces went through each other. Set more `substeps`, slow the colliders, leave more room \
             between them, or raise `thickness`.");
+    JAMMED = Metric::new("jammed", Unit::None,
+        "Contacts with colliders that leave no room above the ground: less than twice `thickness`.")
+        .warn_above(0.0, "A collider closes on the ground with a body between, where there is no room for it. It counts \
+            as stopped above the ground there, and passes through the body. Keep it higher by 2 `thickness` or more.");
     STARTED_INSIDE = Metric::new("started_inside", Unit::None,
         "Particles that are deeper than `thickness` inside a closed collider, inside another body, or below the ground \
          when the simulation starts.")

@@ -296,6 +296,17 @@ fn how_well_a_body_carries_its_weight_is_published_where_something_holds_it_up()
 }
 
 #[test]
+fn contacts_with_a_collider_that_leaves_no_room_above_the_ground_are_counted() {
+    let jammed = |foot: f32| {
+        let slab = block([2, 1, 2], [0.0; 3], [0.1, 0.0012, 0.1]);
+        let plate = solid([-0.05, foot, -0.05], 0.2);
+        simulating(slab).input(COLLIDERS, plate).set(GROUND, true).frames([1, 2])[1].metrics["jammed"]
+    };
+    assert!(jammed(0.0012) > 0.0);
+    assert_eq!(jammed(0.0022), 0.0, "2 `thickness` are left");
+}
+
+#[test]
 fn steps_that_miss_the_tolerance_are_counted() {
     let missed = |tolerance: f64| {
         let stiff = simulating(cube()).set(STIFFNESS, 1e6.into()).set(INITIAL_VELOCITY, [0.0, -3.0, 0.0]);

@@ -36,7 +36,7 @@ use numerics::vector::{DVec3, to_f32};
 pub use obstacle::{Ground, Obstacle};
 pub use pair::ContactParams;
 use std::sync::{Mutex, OnceLock};
-use surface::{Moment, Positions};
+use surface::Positions;
 use swept::BoxTree;
 use vertex::{ContactRules, MovingSurface};
 
@@ -48,6 +48,9 @@ const POINTS: usize = 1024;
 const REACH: f64 = 2.0;
 /// Largest deviation of a rotating obstacle from linear motion between sampled poses, as a fraction of the gap.
 const SAG: f64 = 0.25;
+
+/// Distance along its normal, in gaps, by which an obstacle has to be raised above the ground to leave no room.
+const JAMMED: f64 = 0.5;
 
 /// Why contact detection could not be set up.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -190,6 +193,7 @@ impl CollisionScene<'_> {
                     gap: ground.thickness,
                     velocity: [0.0; 3],
                     friction: ground.friction * self.friction_scale(&[*particle], &[1.0]),
+                    jammed: false,
                 };
                 out.push(FoundContact { contact, start: ground.height });
             }
@@ -319,7 +323,7 @@ impl SkinObstaclePair<'_> {
                 for hit in &hits {
                     let corners = self.obstacle.surface.triangles[hit.face as usize];
                     let first = ([*particle, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]);
-                    out.extend(self.contact(first, (&corners, &hit.weights), hit.normal, hit.shift));
+                    out.push(self.contact(first, (&corners, &hit.weights), hit.normal, hit.shift));
                 }
             }
         };
@@ -360,7 +364,7 @@ impl SkinObstaclePair<'_> {
                     let [a, b, c] = self.skin.surface.triangles[hit.face as usize];
                     let [u, v, w] = hit.weights;
                     let first = ([a, b, c, 0], [u, v, w, 0.0]);
-                    out.extend(self.contact(first, (&[*point], &[1.0]), -hit.normal, hit.shift));
+                    out.push(self.contact(first, (&[*point], &[1.0]), -hit.normal, hit.shift));
                 }
             }
         };
@@ -381,7 +385,7 @@ impl SkinObstaclePair<'_> {
                     if let Some(hit) = edge::hit(&self.body, edge, &self.still, other, &self.rules) {
                         let [s, t] = hit.shares;
                         let first = ([edge.ends[0], edge.ends[1], 0, 0], [1.0 - s, s, 0.0, 0.0]);
-                        out.extend(self.contact(first, (&other.ends, &[1.0 - t, t]), hit.normal, 0.0));
+                        out.push(self.contact(first, (&other.ends, &[1.0 - t, t]), hit.normal, 0.0));
                     }
                 }
             }
@@ -389,45 +393,42 @@ impl SkinObstaclePair<'_> {
         collect_in_order(&indices, &find_in, out);
     }
 
-    /// A contact of particles with points of the obstacle; `None` if it would only push into the ground.
+    /// A contact of particles with points of the obstacle, which counts as stopped above the ground.
     fn contact(
         &self,
         (particles, weights): ([u32; 4], [f64; 4]),
         (points, shares): (&[u32], &[f64]),
         normal: DVec3,
         shift: f64,
-    ) -> Option<FoundContact> {
-        let touched =
-            |at: &Moment<'_>| points.iter().zip(shares).map(|(point, share)| at.position(*point) * *share).sum();
-        let (start, end): (DVec3, DVec3) = (touched(&self.still.start()), touched(&self.still.end()));
-        let gap = self.rules.gap;
-        let normal = self.scene.above_ground(normal, end, gap)?;
+    ) -> FoundContact {
+        let (gap, times) = (self.rules.gap, self.query.times);
+        let [start, end] = [self.still.start(), self.still.end()].map(|at| {
+            let touched = points.iter().zip(shares).map(|(point, share)| at.position(*point) * *share).sum();
+            (touched, self.scene.raised(touched, normal, gap))
+        });
+        let seconds = self.obstacle.seconds * (times[1] - times[0]);
+        let stopping = if seconds > 0.0 { (end.1 - start.1) / seconds } else { DVec3::zeros() };
         let contact = Contact {
             particles,
             weights,
             normal: normal.into(),
-            offset: normal.dot(&end) - shift,
+            offset: normal.dot(&(end.0 + end.1)) - shift,
             gap,
-            velocity: self.obstacle.velocity_of(self.query.times[1], points, shares).into(),
+            velocity: (self.obstacle.velocity_of(times[1], points, shares) + stopping).into(),
             friction: self.obstacle.friction * self.scene.friction_scale(&particles, &weights),
+            jammed: -normal.dot(&end.1) > JAMMED * gap,
         };
-        Some(FoundContact { contact, start: normal.dot(&start) })
+        FoundContact { contact, start: normal.dot(&(start.0 + start.1)) }
     }
 }
 
 impl CollisionScene<'_> {
-    /// The normal, without its downward part if it would push `point` below the ground; `None` if nothing remains.
-    fn above_ground(&self, normal: DVec3, point: DVec3, gap: f64) -> Option<DVec3> {
-        /// Smallest remaining length, above the rounding of a normal straight down.
-        const LEFT: f64 = 1e-3;
-        let Some(ground) = self.ground else { return Some(normal) };
+    /// How far an obstacle has to be raised at `point` so that it does not push along `normal` below the ground.
+    fn raised(&self, point: DVec3, normal: DVec3, gap: f64) -> DVec3 {
+        let Some(ground) = self.ground else { return DVec3::zeros() };
         let up = DVec3::from(ground.up);
-        let down = -normal.dot(&up);
         let pushed = (point + normal * gap).dot(&up) - ground.height;
-        if down <= 0.0 || pushed >= ground.thickness {
-            return Some(normal);
-        }
-        (normal + up * down).try_normalize(LEFT)
+        if normal.dot(&up) < 0.0 { up * (ground.thickness - pushed).max(0.0) } else { DVec3::zeros() }
     }
 }
 

@@ -193,6 +193,7 @@ impl Pair<'_> {
             gap,
             velocity: [0.0; 3],
             friction: self.params.friction * self.scene.friction_scale(&particles, &weights),
+            jammed: false,
         };
         Some(FoundContact { contact, start: 0.0 })
     }

@@ -117,6 +117,8 @@ pub struct FrameReport {
     pub contacts: u32,
     /// Depth of the deepest contact below its gap, metres.
     pub deepest_overlap: f64,
+    /// Closed contacts with obstacles that leave no room between them and the ground: their depth is accepted.
+    pub jammed: u32,
     /// Particles whose result was not finite: they were stopped where they were.
     pub stopped: u32,
 }
@@ -246,7 +248,7 @@ fn halve(
     let unmet = stepped.solved.unmet > 0.0 || stepped.solved.failed;
     let share = times[1] - times[0];
     let no_help = share <= SHORT && stepped.solved.unmet > HELPS * deepest;
-    let hopeless = no_help || report.newton >= MOST_NEWTON;
+    let hopeless = no_help || report.newton >= MOST_NEWTON || stepped.jammed > 0;
     let is_over = (stepper.frame.cancelled)();
     if !unmet || hopeless || is_over || share <= 1.0 / f64::from(MOST_STEPS) {
         add(report, &stepped);
@@ -332,6 +334,7 @@ fn add(report: &mut FrameReport, stepped: &Stepped) {
     report.euler_steps += u32::from(stepped.euler);
     report.stopped = report.stopped.max(stepped.stopped);
     (report.contacts, report.deepest_overlap) = (stepped.contacts, report.deepest_overlap.max(stepped.overlap));
+    report.jammed = report.jammed.max(stepped.jammed);
 }
 
 fn describe(report: &mut FrameReport, context: &FrameContext<'_>, energies: &Energies, motion: &Kinematics) {

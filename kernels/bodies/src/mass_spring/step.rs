@@ -50,6 +50,7 @@ pub(super) struct Stepped {
     pub(super) after: Energies,
     pub(super) contacts: u32,
     pub(super) overlap: f64,
+    pub(super) jammed: u32,
     pub(super) stopped: u32,
 }
 
@@ -105,6 +106,7 @@ impl Stepper<'_> {
         }
         (stepped.contacts, stepped.overlap) = self.solver.active_contacts();
         stepped.overlap = stepped.overlap.max(stepped.solved.deepest);
+        stepped.jammed = full.iter().filter(|contact| contact.is_jammed(&motion.x)).count() as u32;
         let discontinuous = stepped.euler || stepped.contacts > 0;
         let acceleration =
             |(v, before): (&DVec3, &DVec3)| if discontinuous { DVec3::zeros() } else { (v - before) / h };

@@ -138,7 +138,7 @@ fn a_vertex_that_starts_inside_is_pushed_out_gradually_through_the_nearest_side(
 }
 
 #[test]
-fn ground_contacts_come_first_and_nothing_pushes_below_the_ground() {
+fn ground_contacts_come_first_and_those_above_them_are_kept() {
     let (points, faces) = cuboid([1.0; 3]);
     // A cube that comes down on a vertex on the ground, tilted so that it pushes down and sideways.
     let (sine, cosine) = libm::sincos(0.5);
@@ -156,7 +156,34 @@ fn ground_contacts_come_first_and_nothing_pushes_below_the_ground() {
     for (particle, contact) in (0..3).zip(&contacts) {
         assert_eq!((contact.particles[0], contact.normal, contact.friction), (particle, [0.0, 1.0, 0.0], 0.3));
     }
-    assert!(contacts[3..].iter().all(|contact| contact.normal[1] >= -1e-12), "{contacts:?}");
+    assert!(contacts[3..].iter().any(|contact| contact.normal[1] < -0.5 && contact.jammed), "{contacts:?}");
+}
+
+/// A plate that comes down counts as stopped where it leaves one gap of its own above that of the ground.
+#[test]
+fn a_plate_closing_on_the_ground_is_stopped_above_it() {
+    let (points, faces) = cuboid([1.0, 0.2, 1.0]);
+    let still = [[0.2, 0.008, 0.0], [0.3, 0.008, 0.0], [0.2, 0.008, 0.1]];
+    let skins = [BodySkin::new(&still, &[[0, 1, 2]], &[]).unwrap()];
+    let (thickness, gap, seconds) = (0.004, 0.003, 0.5);
+    let ground = Some(Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness, friction: 0.3 });
+    for (foot, stopped, jammed) in
+        [(0.0075, 0.0075, false), (0.006, 0.007, false), (0.005, 0.007, true), (-0.05, 0.007, true)]
+    {
+        let poses = [0.1, foot].map(|foot| points.iter().map(|[x, y, z]| [*x, y + 0.1 + foot, *z]).collect::<Vec<_>>());
+        let poses = [pose(0.0, &poses[0]), pose(1.0, &poses[1])];
+        let obstacles = [Obstacle::new(&faces, &poses, seconds, gap, 0.5).unwrap()];
+        let scene = CollisionScene { skins: &skins, obstacles: &obstacles, ground, ..CollisionScene::default() };
+        let (contacts, _) = find(&scene, &still, &still, [0.0, 1.0]);
+        let pressing: Vec<_> = contacts.iter().filter(|contact| contact.normal[1] < 0.0).collect();
+        assert_eq!(pressing.len(), 3, "one a vertex, at {foot}");
+        for contact in pressing {
+            let falls = -contact.velocity[1] * seconds;
+            assert!((contact.normal[1] + 1.0).abs() < 1e-9 && contact.jammed == jammed, "{foot}: {contact:?}");
+            assert!((contact.offset + stopped).abs() < 1e-9, "{foot}: {contact:?}");
+            assert!((falls - (0.1 - stopped)).abs() < 1e-9, "{foot}: from where it really was, {contact:?}");
+        }
+    }
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! Bodies too soft to carry their weight: all particles meet what they touch, not only those of the skin.
+//! Bodies too soft to carry their weight, of which all particles meet what they touch, not only those of the skin; and
+//! bodies that a plate leaves no room.
 
 use super::bodies::{Block, FRAME, THICKNESS, block};
 use super::*;
@@ -94,4 +95,38 @@ fn inner_particles_meet_obstacles_and_other_skins_but_not_their_own() {
     assert_eq!(mine(&CollisionScene { body_contact: touch, ..bare }), 1);
     assert_eq!(mine(&CollisionScene { obstacles: &obstacles, ..bare }), 1);
     assert_eq!(mine(&CollisionScene { self_contact: touch, ..bare }), 0);
+}
+
+/// A plate comes down to the ground, stays there and lifts off. There is no room under it, which is given up soon and
+/// said; afterwards the block has its volume, on the ground and below the plate.
+#[test]
+fn a_block_under_a_plate_that_leaves_no_room_comes_back_below_it() {
+    let (points, tets, faces) = block([3; 3], 0.1 / 3.0, [0.0, 2.0 * THICKNESS, 0.0]);
+    let (plate, triangles) = cuboid([2.0, 0.1, 2.0]);
+    let foot = |time: f64| if time < 9.0 { (0.11 - 0.11 * time / 3.0).max(0.0) } else { 0.05 * (time - 9.0) };
+    let ground = Some(Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness: THICKNESS, friction: 0.5 });
+    for stiffness in [5e3, 1e9] {
+        let plain = |value| Masked::uniform(value);
+        let material = Material { density: plain(1e3), stiffness: plain(stiffness), damping: plain(0.01) };
+        let body = SoftBody::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material, &[]).unwrap();
+        let skins = [BodySkin::new(&points, &faces, &body.springs()).unwrap()];
+        let (mut state, mut solver) = (State::at_rest(&body), BodySolver::new(&body));
+        for frame in 0..24 {
+            let poses = [0.0, 0.5, 1.0].map(|share| {
+                let foot = foot(f64::from(frame) + share);
+                pose(share, &plate.iter().map(|[x, y, z]| [*x, y + 0.05 + foot, *z]).collect::<Vec<_>>())
+            });
+            let plate = [Obstacle::new(&triangles, &poses, FRAME, THICKNESS, 0.5).unwrap()];
+            let scene = CollisionScene { skins: &skins, obstacles: &plate, ground, ..CollisionScene::default() };
+            let frame_input = SolverFrame { contacts: Some(&scene), seconds: FRAME, ..SolverFrame::default() };
+            let report = solver.step(&body, &mut state, &frame_input);
+            let jammed = (2..9).contains(&frame);
+            assert_eq!(report.jammed > 0, jammed, "E {stiffness}, frame {frame}: {report:?}");
+            assert!(!jammed || report.newton <= 100, "E {stiffness}, frame {frame}: {report:?}");
+            let highest = state.positions.iter().map(|p| p[1]).fold(0.0, f64::max);
+            assert!(frame < 12 || highest < foot(f64::from(frame + 1)), "E {stiffness}, frame {frame}: {highest} m");
+            assert!(frame < 23 || (report.volume_ratio - 1.0).abs() < 0.02, "E {stiffness}: {report:?}");
+        }
+        assert!(lowest(&state) > 0.0);
+    }
 }

@@ -26,6 +26,7 @@ impl ContactFinder for Planes {
                         gap: THICKNESS,
                         velocity: (n * ((heights[1] - heights[0]) / self.1)).into(),
                         friction: *friction,
+                        jammed: false,
                     });
                 }
             }
@@ -71,6 +72,7 @@ impl ContactFinder for RollingPin {
                     gap: THICKNESS,
                     velocity: (pace + DVec3::z().cross(&n) * (self.angular_velocity * self.radius)).into(),
                     friction: self.friction,
+                    jammed: false,
                 });
             }
         }
@@ -277,6 +279,7 @@ impl ContactFinder for Stack {
                     gap: THICKNESS,
                     velocity: [0.0; 3],
                     friction: 0.5,
+                    jammed: false,
                 });
             }
         }
