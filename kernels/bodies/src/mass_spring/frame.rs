@@ -87,8 +87,7 @@ pub struct FrameReport {
     /// Solves that reached their limit of iterations while particles still moved by more than 1e-4 of the size of the
     /// bodies, and steps that left contacts too deep.
     pub caps_hit: u32,
-    /// Steps of [`Integrator::Accurate`] that were accepted with a larger estimated error than its tolerance allows. Steps
-    /// that start out of balance do not count: their estimate only tells the size of the jump.
+    /// Steps of [`Integrator::Accurate`] that were accepted with a larger estimated error than its tolerance allows.
     pub tolerance_missed: u32,
     /// Estimated error of positions that the frame added, metres: the sum over its steps of the largest error of a
     /// particle.
@@ -223,7 +222,7 @@ fn run(stepper: &mut Stepper<'_>, motion: &mut Kinematics, energies: &mut Energi
         *energies = stepped.after;
         add(report, &stepped);
         let allowed = accurate.map_or(f64::INFINITY, |tolerance| tolerance * (times[1] - times[0]));
-        report.tolerance_missed += u32::from(!stepped.damped && stepped.estimate > allowed);
+        report.tolerance_missed += u32::from(stepped.estimate > allowed);
     }
 }
 
@@ -288,9 +287,7 @@ fn adapt(
         let stepped = stepper.step(motion, [time, end], energies, Some(tolerance), damp);
         let allowed = tolerance * (end - time);
         let smallest = end - time <= 2.0 / f64::from(MOST_STEPS) || report.newton >= MOST_NEWTON;
-        // Steps that start out of balance are damped, so their error estimate only tells the size of the jump; at
-        // contacts it counts.
-        let close = stepped.estimate <= allowed || stepped.damped || (stepped.euler && smallest);
+        let close = stepped.estimate <= allowed || (stepped.euler && smallest);
         let fits = close && (stepped.solved.unmet <= 0.0 || smallest);
         // The estimate ÷ step size is proportional to the step size for a first-order method, to its square for a
         // second-order one.
@@ -306,7 +303,7 @@ fn adapt(
         damp = !fits && smallest;
         if fits {
             add(report, &stepped);
-            report.tolerance_missed += u32::from(gave_up || (!stepped.damped && stepped.estimate > allowed));
+            report.tolerance_missed += u32::from(gave_up || stepped.estimate > allowed);
             *energies = stepped.after;
             time = end;
         } else {

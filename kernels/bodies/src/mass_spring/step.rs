@@ -43,8 +43,6 @@ pub(super) struct Stepped {
     /// Largest estimated error of a particle, metres.
     pub(super) estimate: f64,
     pub(super) euler: bool,
-    /// Whether implicit Euler was used to damp the step, not because of contacts.
-    pub(super) damped: bool,
     /// Energy removed to prevent a spurious gain, joules.
     pub(super) energy_removed: f64,
     pub(super) after: Energies,
@@ -97,7 +95,7 @@ impl Stepper<'_> {
         let (mut stepped, after) = if force_implicit_euler || self.frame.integrator == Integrator::Euler {
             let damped = damp || self.frame.force_implicit_euler || turned;
             let (solved, estimate) = self.euler(motion, times, &mut full, damped);
-            (Stepped { solved, estimate, euler: true, damped, ..Stepped::default() }, None)
+            (Stepped { solved, estimate, euler: true, ..Stepped::default() }, None)
         } else {
             self.tr_bdf2_or_euler(motion, times, before, tolerance, &mut full)
         };
@@ -155,11 +153,10 @@ impl Stepper<'_> {
             return (Stepped { solved, estimate, ..Stepped::default() }, Some(energies));
         }
         motion.clone_from(&start);
-        let damped = solved.failed || gained;
-        let (again, estimate) = self.euler(motion, times, contacts, damped);
+        let (again, estimate) = self.euler(motion, times, contacts, solved.failed || gained);
         let solved = Solved { failed: again.failed, residual: again.residual, ..sum(solved, again) };
         *self.euler_steps_left = if active_set_unchanged { 0 } else { EULER_STEPS_AFTER_CHANGE };
-        (Stepped { solved, estimate, euler: true, damped, ..Stepped::default() }, None)
+        (Stepped { solved, estimate, euler: true, ..Stepped::default() }, None)
     }
 
     /// Takes stock of the tetrahedra at the current positions, for the next step.
