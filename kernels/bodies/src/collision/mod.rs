@@ -126,66 +126,33 @@ pub struct CollisionScene<'a> {
     pub self_contact: Option<ContactParams>,
 }
 
-/// Summary of a search.
-#[must_use]
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ContactSummary {
-    /// Number of contacts.
-    pub contacts: u32,
-    /// Largest depth below the gap at the start of the motion, along the normal at its end, metres.
-    pub deepest_overlap: f64,
-}
-
 impl ContactFinder for CollisionScene<'_> {
+    /// The order is: ground contacts by particle; those of each obstacle by particle, then by its own points, then by
+    /// edges; then pairs of bodies; then self-contacts.
     fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
-        let _ = self.search(query, out);
-    }
-}
-
-/// A contact, and its offset at the start of the motion.
-#[derive(Clone, Copy, Debug)]
-struct FoundContact {
-    contact: Contact,
-    /// n·u at which the surfaces touch at the start.
-    start: f64,
-}
-
-impl CollisionScene<'_> {
-    /// As [`ContactFinder::find`], with a summary. The order is: ground contacts by particle; those of each obstacle
-    /// by particle, then by its own points, then by edges; then pairs of bodies; then self-contacts.
-    pub fn search(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) -> ContactSummary {
-        let mut seen = Vec::new();
-        self.on_ground(query, &mut seen);
+        self.on_ground(query, out);
         let boxes = swept::swept_boxes(&[query.from, query.to]);
         if !self.obstacles.is_empty() {
             for skin in self.skins {
                 let faces = skin.faces.sweep(&boxes, 0.0);
                 let released = skin.released(query.from);
                 for obstacle in self.obstacles {
-                    self.against_obstacle(query, (skin, &released), &boxes, &faces, obstacle, &mut seen);
+                    self.against_obstacle(query, (skin, &released), &boxes, &faces, obstacle, out);
                 }
             }
         }
-        self.pairs(query, &boxes, &mut seen);
-        let mut found = ContactSummary { contacts: seen.len() as u32, deepest_overlap: 0.0 };
-        for FoundContact { contact, start } in &seen {
-            let sides = contact.particles.iter().zip(contact.weights).filter(|side| side.1 != 0.0);
-            let apart: DVec3 =
-                sides.map(|(particle, weight)| DVec3::from(query.from[*particle as usize]) * weight).sum();
-            let height = DVec3::from(contact.normal).dot(&apart) - start;
-            found.deepest_overlap = found.deepest_overlap.max(contact.gap - height);
-        }
-        out.extend(seen.iter().map(|seen| seen.contact));
-        found
+        self.pairs(query, &boxes, out);
     }
+}
 
-    fn on_ground(&self, query: &ContactQuery<'_>, out: &mut Vec<FoundContact>) {
+impl CollisionScene<'_> {
+    fn on_ground(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
         let Some(ground) = self.ground else { return };
         let up = DVec3::from(ground.up);
         for particle in self.skins.iter().flat_map(|skin| &skin.touching) {
             let height = |x: &[[f64; 3]]| up.dot(&DVec3::from(x[*particle as usize])) - ground.height;
             if height(query.from).min(height(query.to)) <= REACH * ground.thickness {
-                let contact = Contact {
+                out.push(Contact {
                     particles: [*particle, 0, 0, 0],
                     weights: [1.0, 0.0, 0.0, 0.0],
                     normal: ground.up,
@@ -194,8 +161,7 @@ impl CollisionScene<'_> {
                     velocity: [0.0; 3],
                     friction: ground.friction * self.friction_scale(&[*particle], &[1.0]),
                     jammed: false,
-                };
-                out.push(FoundContact { contact, start: ground.height });
+                });
             }
         }
     }
@@ -221,7 +187,7 @@ impl CollisionScene<'_> {
         boxes: &[Cuboid],
         faces: &BoxTree<'_>,
         obstacle: &Obstacle,
-        out: &mut Vec<FoundContact>,
+        out: &mut Vec<Contact>,
     ) {
         let rules = ContactRules { gap: obstacle.thickness, reach: REACH * obstacle.thickness, push: true };
         let times = obstacle.motion.times(query.times, SAG * obstacle.thickness);
@@ -280,10 +246,10 @@ struct SkinObstaclePair<'a> {
 }
 
 /// Adds the contacts of some things to a list, with buffers that another task may have used before.
-type FindIn<'a, S> = dyn Fn(&mut S, &[u32], &mut Vec<FoundContact>) + Sync + 'a;
+type FindIn<'a, S> = dyn Fn(&mut S, &[u32], &mut Vec<Contact>) + Sync + 'a;
 
 /// Collects the contacts of `things` in their order, for any number of threads.
-fn collect_in_order<S: Default + Send>(things: &[u32], find_in: &FindIn<'_, S>, out: &mut Vec<FoundContact>) {
+fn collect_in_order<S: Default + Send>(things: &[u32], find_in: &FindIn<'_, S>, out: &mut Vec<Contact>) {
     let unused: Mutex<Vec<S>> = Mutex::default();
     let lock = || unused.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let parts = parallel::map(things.chunks(TASK), |_, things| {
@@ -303,11 +269,11 @@ fn path_of(poses: &[Positions<'_>], point: u32, path: &mut Vec<DVec3>) {
 
 impl SkinObstaclePair<'_> {
     /// Particles of the skin against triangles of the obstacle.
-    fn particles(&self, tree: &BoxTree<'_>, out: &mut Vec<FoundContact>) {
+    fn particles(&self, tree: &BoxTree<'_>, out: &mut Vec<Contact>) {
         // A particle may be inside anywhere within the bounds; only closed obstacles have an inside.
         let (solid, bounds) = (OnceLock::new(), tree.bounds);
         let has_inside = self.obstacle.surface.closed;
-        let find_in = |(): &mut (), particles: &[u32], out: &mut Vec<FoundContact>| {
+        let find_in = |(): &mut (), particles: &[u32], out: &mut Vec<Contact>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
             for particle in particles.iter().filter(|particle| !self.released.has_particle(**particle)) {
                 tree.overlapping(&self.boxes[0][*particle as usize], &mut faces);
@@ -347,8 +313,8 @@ impl SkinObstaclePair<'_> {
     }
 
     /// Sharp points of the obstacle against triangles of the skin.
-    fn points(&self, tree: &BoxTree<'_>, out: &mut Vec<FoundContact>) {
-        let find_in = |(): &mut (), points: &[u32], out: &mut Vec<FoundContact>| {
+    fn points(&self, tree: &BoxTree<'_>, out: &mut Vec<Contact>) {
+        let find_in = |(): &mut (), points: &[u32], out: &mut Vec<Contact>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
             for point in points {
                 let region = swept::inflated(&self.boxes[1][*point as usize], self.rules.reach);
@@ -372,10 +338,10 @@ impl SkinObstaclePair<'_> {
     }
 
     /// Edges of the skin against sharp edges of the obstacle.
-    fn edges(&self, out: &mut Vec<FoundContact>) {
+    fn edges(&self, out: &mut Vec<Contact>) {
         let tree = self.obstacle.edges.sweep(self.boxes[1], self.rules.reach);
         let indices: Vec<u32> = (0..self.skin.surface.edges.len() as u32).collect();
-        let find_in = |(): &mut (), edges: &[u32], out: &mut Vec<FoundContact>| {
+        let find_in = |(): &mut (), edges: &[u32], out: &mut Vec<Contact>| {
             let mut others = Vec::new();
             for index in edges.iter().filter(|edge| !self.released.has_edge(**edge)) {
                 let edge = &self.skin.surface.edges[*index as usize];
@@ -400,25 +366,24 @@ impl SkinObstaclePair<'_> {
         (points, shares): (&[u32], &[f64]),
         normal: DVec3,
         shift: f64,
-    ) -> FoundContact {
+    ) -> Contact {
         let (gap, times) = (self.rules.gap, self.query.times);
-        let [start, end] = [self.still.start(), self.still.end()].map(|at| {
+        let [(_, raised), (end, raised_end)] = [self.still.start(), self.still.end()].map(|at| {
             let touched = points.iter().zip(shares).map(|(point, share)| at.position(*point) * *share).sum();
             (touched, self.scene.raised(touched, normal, gap))
         });
         let seconds = self.obstacle.seconds * (times[1] - times[0]);
-        let stopping = if seconds > 0.0 { (end.1 - start.1) / seconds } else { DVec3::zeros() };
-        let contact = Contact {
+        let stopping = if seconds > 0.0 { (raised_end - raised) / seconds } else { DVec3::zeros() };
+        Contact {
             particles,
             weights,
             normal: normal.into(),
-            offset: normal.dot(&(end.0 + end.1)) - shift,
+            offset: normal.dot(&(end + raised_end)) - shift,
             gap,
             velocity: (self.obstacle.velocity_of(times[1], points, shares) + stopping).into(),
             friction: self.obstacle.friction * self.scene.friction_scale(&particles, &weights),
-            jammed: -normal.dot(&end.1) > JAMMED * gap,
-        };
-        FoundContact { contact, start: normal.dot(&(start.0 + start.1)) }
+            jammed: -normal.dot(&raised_end) > JAMMED * gap,
+        }
     }
 }
 

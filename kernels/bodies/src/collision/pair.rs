@@ -4,7 +4,7 @@ use super::body_skin::BodySkin;
 use super::edge;
 use super::swept::{self, BoxTree};
 use super::vertex::{self, ContactRules, MovingSurface};
-use super::{CollisionScene, FoundContact, REACH, collect_in_order};
+use super::{CollisionScene, REACH, collect_in_order};
 use crate::mass_spring::{Contact, ContactQuery};
 use numerics::tree::Cuboid;
 use numerics::vector::DVec3;
@@ -68,7 +68,7 @@ struct Boxes<'a> {
 
 impl CollisionScene<'_> {
     /// All pairs of skins, then each skin with itself.
-    pub(super) fn pairs(&self, query: &ContactQuery<'_>, points: &[Cuboid], out: &mut Vec<FoundContact>) {
+    pub(super) fn pairs(&self, query: &ContactQuery<'_>, points: &[Cuboid], out: &mut Vec<Contact>) {
         let boxes = |reach: f64| -> Vec<Boxes<'_>> {
             let of = self.skins.iter().map(|skin| Boxes {
                 bounds: swept::inflated(&swept::bounds_of_finite(&skin.touching, points), reach),
@@ -110,11 +110,11 @@ impl CollisionScene<'_> {
 
 impl Pair<'_> {
     /// Particles of the first skin against triangles of the second; of the same skin only those of its surface.
-    fn particles(&self, boxes: &Boxes<'_>, out: &mut Vec<FoundContact>) {
+    fn particles(&self, boxes: &Boxes<'_>, out: &mut Vec<Contact>) {
         let poses = [self.query.from, self.query.to];
         let [first, second] = self.skins;
         let on = MovingSurface { surface: &second.surface, poses: &poses };
-        let find_in = |marks: &mut Marks, particles: &[u32], out: &mut Vec<FoundContact>| {
+        let find_in = |marks: &mut Marks, particles: &[u32], out: &mut Vec<Contact>| {
             let (mut faces, mut hits) = (Vec::new(), Vec::new());
             for particle in particles {
                 boxes.faces.overlapping(&self.points[*particle as usize], &mut faces);
@@ -141,12 +141,12 @@ impl Pair<'_> {
     }
 
     /// Edges of the first skin against those of the second.
-    fn edges(&self, boxes: &Boxes<'_>, out: &mut Vec<FoundContact>) {
+    fn edges(&self, boxes: &Boxes<'_>, out: &mut Vec<Contact>) {
         let poses = [self.query.from, self.query.to];
         let [first, second] = self.skins;
         let [one, two] = [first, second].map(|skin| MovingSurface { surface: &skin.surface, poses: &poses });
         let indices: Vec<u32> = (0..first.surface.edges.len() as u32).collect();
-        let find_in = |marks: &mut Marks, edges: &[u32], out: &mut Vec<FoundContact>| {
+        let find_in = |marks: &mut Marks, edges: &[u32], out: &mut Vec<Contact>| {
             let mut others = Vec::new();
             for index in edges {
                 let edge = &first.surface.edges[*index as usize];
@@ -174,18 +174,11 @@ impl Pair<'_> {
         if self.self_contact { self.params.thickness.min(at_rest()) } else { self.params.thickness }
     }
 
-    fn contact(
-        &self,
-        particles: [u32; 4],
-        weights: [f64; 4],
-        normal: DVec3,
-        shift: f64,
-        gap: f64,
-    ) -> Option<FoundContact> {
+    fn contact(&self, particles: [u32; 4], weights: [f64; 4], normal: DVec3, shift: f64, gap: f64) -> Option<Contact> {
         if gap < JOINED * self.params.thickness {
             return None;
         }
-        let contact = Contact {
+        Some(Contact {
             particles,
             weights,
             normal: normal.into(),
@@ -194,7 +187,6 @@ impl Pair<'_> {
             velocity: [0.0; 3],
             friction: self.params.friction * self.scene.friction_scale(&particles, &weights),
             jammed: false,
-        };
-        Some(FoundContact { contact, start: 0.0 })
+        })
     }
 }

@@ -100,7 +100,7 @@ fn projecting_onto_contacts_keeps_vertices_outside_a_rolling_pin() {
     let mut now = points.clone();
     // Vertices that are moved only by projection onto their contacts.
     let put = |scene: &CollisionScene<'_>| {
-        let (mut contacts, _) = find(scene, &now, &now, [0.0, 1.0]);
+        let mut contacts = find(scene, &now, &now, [0.0, 1.0]);
         contacts.retain(|contact| contact.weights[1] == 0.0);
         for _ in 0..50 {
             for contact in &contacts {

@@ -89,7 +89,7 @@ fn inner_particles_meet_obstacles_and_other_skins_but_not_their_own() {
     let plate: Vec<[f64; 3]> = plate.iter().map(|[x, y, z]| [*x, *y, z + 0.3]).collect();
     let obstacles = [Obstacle::new(&triangles, &[pose(0.0, &plate)], 1.0, 0.06, 0.5).unwrap()];
     let mine = |scene: &CollisionScene<'_>| {
-        find(scene, &all, &to, [0.0, 1.0]).0.iter().filter(|contact| contact.particles[0] == inner).count()
+        find(scene, &all, &to, [0.0, 1.0]).iter().filter(|contact| contact.particles[0] == inner).count()
     };
     let bare = CollisionScene { skins: &skins, ..CollisionScene::default() };
     assert_eq!(mine(&CollisionScene { body_contact: touch, ..bare }), 1);
