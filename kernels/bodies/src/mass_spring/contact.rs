@@ -176,6 +176,11 @@ impl ContactConstraint {
         sides.into_iter().filter(|(_, weight)| *weight != 0.0)
     }
 
+    /// Whether it is between bodies: the sum of its weights is 0 there, and 1 with an obstacle.
+    pub(super) fn is_two_sided(&self) -> bool {
+        self.weights.iter().sum::<f64>().abs() < 0.5
+    }
+
     /// Whether it is closed at `x` although the obstacle leaves no room there.
     pub(super) fn is_jammed(&self, x: &[DVec3]) -> bool {
         self.jammed && self.clearance(x, 0.0) < 0.0
