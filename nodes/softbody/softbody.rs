@@ -80,7 +80,10 @@ params! { PARAMS:
         "Mass per volume. At the same stiffness, denser bodies sag more.")
         .unit(Unit::KilogramsPerCubicMetre).above(0.0).soft(100.0, 3000.0);
     STIFFNESS: Param<Maskable> = Param::maskable("stiffness", 5e3,
-        "Resistance to stretching (Young's modulus): dough 1e3 to 1e4, gelatine 1e4, rubber 1e6.")
+        "Resistance to stretching (Young's modulus): dough 1e3 to 1e4, gelatine 1e4, rubber 1e6. To carry its weight a \
+         body needs about `density` × gravity × its height: with that much it sags by a sixth, with a quarter of it to \
+         half its height, with a twentieth tets turn inside out, and with less than a thousandth it is a flat heap that \
+         loses its volume.")
         .unit(Unit::Pascal).at_least(0.0).soft(0.0, 1e6);
     DAMPING: Param<Maskable> = Param::maskable("damping", 0.01,
         "How quickly wobbling fades: the ratio of the springs' damping to their stiffness. With 0 bodies keep \
@@ -191,6 +194,11 @@ metrics! { METRICS:
     INVERTED_TETS = Metric::new("inverted_tets", Unit::None, "Tets that are inside out.")
         .warn_above(0.0, "Parts of a body are turned inside out: something squeezes it harder than it can resist. \
             Raise `volume` or `stiffness`, slow the colliders, or leave more room between them.");
+    STIFFNESS_TO_WEIGHT = Metric::new("stiffness_to_weight", Unit::None,
+        "How well the softest body carries its own weight: `stiffness` ÷ (density × gravity × height). Missing without \
+         weight, or without colliders and ground to lie on.")
+        .warn_outside(0.25, f64::INFINITY, "A body is too soft to carry its weight: it flattens where it lies. Raise \
+            `stiffness`, or lower `density` or `gravity`.");
     CONTACTS = Metric::new("contacts", Unit::None, "Contacts in which surfaces press on each other.");
     DEEPEST_OVERLAP = Metric::new("deepest_overlap", Unit::Metres,
         "By how much surfaces came closer than `thickness` at the worst contact. More than `thickness` means \
@@ -199,9 +207,13 @@ metrics! { METRICS:
         "By how much `deepest_overlap` exceeds `thickness`: how far surfaces went through each other.")
         .warn_above(0.0, "Surfaces went through each other. Set more `substeps`, slow the colliders, leave more room \
             between them, or raise `thickness`.");
+    JAMMED = Metric::new("jammed", Unit::None,
+        "Contacts with colliders that leave no room above the ground: less than twice `thickness`.")
+        .warn_above(0.0, "A collider closes on the ground with a body between, where there is no room for it. It counts \
+            as stopped above the ground there, and passes through the body. Keep it higher by 2 `thickness` or more.");
     STARTED_INSIDE = Metric::new("started_inside", Unit::None,
-        "Particles of surfaces that are deeper than `thickness` inside a closed collider, inside another body, or below \
-         the ground when the simulation starts.")
+        "Particles that are deeper than `thickness` inside a closed collider, inside another body, or below the ground \
+         when the simulation starts.")
         .warn_above(0.0, "Bodies start inside a collider, inside each other or below the ground, and are pushed out \
             abruptly, or on the wrong side. Move them apart at `start_frame`.");
     LET_GO = Metric::new("let_go", Unit::None,
@@ -245,12 +257,11 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
-    2,
+    3,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
      other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
      pins hold them. `stiffness` has the same effect at any mesh resolution, and the solver is stable for any \
-     stiffness, mass and initial state. Inner particles do not collide: bodies softer than a few hundred pascals may \
-     collapse and come out through their surface.",
+     stiffness, mass and initial state.",
     Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),
 )
 .inputs(INPUTS)
@@ -388,6 +399,10 @@ impl Chain for Run {
         self.metrics.set(LET_GO, let_go as f64);
         self.metrics.set(STARTED_INSIDE, started_inside);
         let thickness = f64::from(cx.get(THICKNESS));
+        let support = solving.body.stiffness_to_weight(frame.gravity);
+        if support.is_finite() && (scene.ground.is_some() || !obstacles.is_empty()) {
+            self.metrics.set(STIFFNESS_TO_WEIGHT, support);
+        }
         self.metrics.set(DEEPEST_PENETRATION, (report.deepest_overlap - thickness).max(0.0));
         self.metrics.set(GOAL_DISTANCE, far.unwrap_or(0.0));
         goals.measure(times[1], on, &self.state.positions, &mut self.metrics);

@@ -42,7 +42,7 @@ impl ContactFilters {
             }
             let mut block = system.blocks.get(particle).copied().unwrap_or_default();
             if !system.transient.is_empty() {
-                system.transient.add_block(particle, 1.0, &mut block);
+                system.transient.add_block(particle, 1.0, system.anchors, &mut block);
             }
             if system.held[particle] || block.iter().all(|x| *x == 0.0) {
                 continue;
@@ -124,15 +124,11 @@ impl Layout {
         layout
     }
 
-    /// Extends the envelope `first` by the coupling between the clusters of `particles`, within the same piece.
+    /// Extends the envelope `first` by the coupling between the clusters of `particles`.
     pub(super) fn join(&self, first: &mut [u32], particles: &[u32]) {
         let clusters = || particles.iter().map(|particle| self.cluster[*particle as usize]);
         let Some(least) = clusters().min() else { return };
-        for cluster in clusters() {
-            if self.piece[cluster as usize] == self.piece[least as usize] {
-                first[cluster as usize] = first[cluster as usize].min(least);
-            }
-        }
+        clusters().for_each(|cluster| first[cluster as usize] = first[cluster as usize].min(least));
     }
 
     /// Number of rows of the coarse matrix.
