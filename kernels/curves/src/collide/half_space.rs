@@ -10,8 +10,8 @@ use numerics::lanes::LANES;
 use numerics::tree::{Block, Boxes, Region};
 use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
 
-/// Rounding of positions, of the plane of a turn (1e-9 at least is divided by) and of boxes, relative to the largest
-/// coordinate.
+/// Rounding relative to the largest coordinate: of f32 positions and boxes 1e-7, of the plane of a turn, whose sine is at
+/// least 1e-9, 2e-7.
 const ROUNDING: f64 = 5e-7;
 
 /// Cosine of the angle between the facet under a root and the smooth normal up to which the facet's normal is taken. It
@@ -83,8 +83,8 @@ impl HalfSpace {
         if !in_reach || !facing.is_finite() || facing < OPPOSITE {
             return false;
         }
-        // Height of the pivot above everything, and least slope of all directions of the turn: that of an end if both
-        // rise, else at least that of its middle if the ends are equally low.
+        // Height of the pivot above everything, and a lower bound of the slopes of the turn: that of an end if both
+        // rise, else that of the middle of a turn between two ends as low as the lower one.
         let height = up.dot(&away) - f64::from(self.rise) - rounding;
         let slope = from.dot(&up).min(to.dot(&up));
         let lowest = if slope < 0.0 { (slope * (2.0 / facing).sqrt()).max(-1.0) } else { slope };
