@@ -11,6 +11,9 @@ use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
 
 /// Contacts between bodies are left out where they make factoring more than this many times as dear.
 const DEARER: f64 = 8.0;
+/// Cost of factoring that is never too much: the sum of the squared numbers of clusters in each row, worth a few
+/// milliseconds.
+const CHEAP: f64 = 2e4;
 
 /// What the matrix is assembled from.
 #[derive(Clone, Copy)]
@@ -27,15 +30,7 @@ impl Galerkin<'_> {
     /// Assembles the matrix and factors it.
     pub(super) fn factor(&self) -> Lower {
         let (layout, transient) = (self.layout, &self.system.transient);
-        let joined = |rows: usize| {
-            let mut first = layout.first.clone();
-            (0..rows).for_each(|row| layout.join(&mut first, transient.particles(row)));
-            let widths = first.iter().enumerate().map(|(cluster, first)| (cluster + 1 - *first as usize) as f64);
-            (rows, widths.map(|width| width * width).sum::<f64>(), first)
-        };
-        let anchors = joined(if transient.is_empty() { 0 } else { self.system.anchors });
-        let all = joined(if transient.is_empty() { 0 } else { transient.len() });
-        let (rows, _, first) = if all.1 <= DEARER * anchors.1 { all } else { anchors };
+        let (rows, first) = envelope(layout, self.system);
         let begin = |row: usize| MODES * first[row / MODES] as usize;
         let mut matrix = Lower::zeros((0..layout.rows()).map(begin));
         let bands = Partition::new(matrix.bands(MODES));
@@ -165,6 +160,19 @@ impl Galerkin<'_> {
         }
         couplings
     }
+}
+
+/// The number of transient terms that the matrix has, and for each cluster the first one it is coupled to by them.
+pub(super) fn envelope(layout: &Layout, system: &System) -> (usize, Vec<u32>) {
+    let joined = |rows: usize| {
+        let mut first = layout.first.clone();
+        (0..rows).for_each(|row| layout.join(&mut first, system.transient.particles(row)));
+        let widths = first.iter().enumerate().map(|(cluster, first)| (cluster + 1 - *first as usize) as f64);
+        (widths.map(|width| width * width).sum::<f64>(), (rows, first))
+    };
+    let count = if system.transient.is_empty() { 0 } else { system.transient.len() };
+    let (anchors, all) = (joined(system.anchors.min(count)), joined(count));
+    if all.0 <= f64::max(DEARER * anchors.0, CHEAP) { all.1 } else { anchors.1 }
 }
 
 /// Change of a rank-one term by the rigid motions of one cluster.
