@@ -9,7 +9,7 @@ use std::time::Duration;
 use engine::clock::Stopwatch;
 use engine::cook::{Delivered, Report, Stopped};
 use engine::geometry::Geometry;
-use engine::graph::{Graph, fault::code};
+use engine::graph::{Fault, Graph, fault::code};
 use engine::memory::Ceiling;
 use engine::plan::Request;
 use engine::time::Frame;
@@ -131,7 +131,11 @@ impl Subject<'_> {
                 failure.lines.iter_mut().for_each(|line| *line = line.replacen("--set ", "--knob ", 1));
                 Err(failure)
             }
-            None => Ok(Cooked::Failed(faults[0].to_string())),
+            None => {
+                // Without its position, which is in the value alone.
+                let fault = faults.into_iter().next().map(|fault| Fault { line: 0, ..fault });
+                Ok(Cooked::Failed(fault.map(|fault| fault.to_string()).unwrap_or_default()))
+            }
         }
     }
 

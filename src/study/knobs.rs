@@ -116,12 +116,13 @@ impl Knob {
         }
         let next = beyond(&numbers, self.accuracy.and_then(|accuracy| accuracy.finer))?;
         let best = *numbers.last()?;
+        let goes_up = next > best;
         let mut next = within(next, &spec.facts.hard);
         if is_whole {
             // Rounding must not lead back to the best.
             next = if next > best { next.ceil() } else { next.floor() };
         }
-        (next != best && spec.facts.hard.hold(next)).then(|| number_text(next))
+        (next != best && (next > best) == goes_up && spec.facts.hard.hold(next)).then(|| number_text(next))
     }
 
     /// The number by which the knob's error falls, the smaller the finer: the number itself, or 1 ÷ the number where the

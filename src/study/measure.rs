@@ -224,7 +224,9 @@ impl<'a> Study<'a> {
                         why += &format!(" (nothing is beyond the best of {})", without.join(", "));
                     }
                     self.stored.is_beyond = !is_exact;
-                    self.stored.floor = is_exact.then(|| rounding(&reference, &self.subject.norm.measure));
+                    self.stored.rounding = rounding(&reference, &self.subject.norm.measure);
+                    let rounding = self.stored.rounding;
+                    self.stored.floor = is_exact.then_some(Errors { mean: rounding, p99: rounding, max: rounding });
                     (self.stored.reference, self.stored.why, self.reference) = (set, why, Some(reference));
                     return Ok(());
                 }
@@ -294,14 +296,13 @@ impl<'a> Study<'a> {
     }
 }
 
-/// The floor of an exact reference: four units in the last place of the largest coordinate, in which positions are stored;
-/// nothing for what is not a length.
-fn rounding(reference: &Reference, measure: &Measure) -> Errors {
+/// What the storage of positions may change of an error: four units in the last place of the largest coordinate; nothing of
+/// what is not a length.
+fn rounding(reference: &Reference, measure: &Measure) -> f64 {
     let largest = reference.largest_coordinate();
     let ulp = f64::from(largest.next_up()) - f64::from(largest);
-    let floor = match measure {
+    match measure {
         Measure::Points | Measure::Surface => 4.0 * ulp,
         Measure::Volume | Measure::Attribute(_) | Measure::Metric { .. } => 0.0,
-    };
-    Errors { mean: floor, p99: floor, max: floor }
+    }
 }

@@ -193,6 +193,7 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
         why: found.stored.why,
         floor: found.stored.floor,
         is_beyond: found.stored.is_beyond,
+        rounding: found.stored.rounding,
         runs: found.stored.runs,
         front: Vec::new(),
         pick: None,

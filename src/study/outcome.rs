@@ -31,6 +31,8 @@ pub(super) struct Outcome {
     pub(super) floor: Option<Errors>,
     /// Whether the reference is a setting beyond the best, which converges as the runs do.
     pub(super) is_beyond: bool,
+    /// What the storage of positions may change of an error.
+    pub(super) rounding: f64,
     /// In the order of the grid.
     pub(super) runs: Vec<Run>,
     pub(super) front: Vec<usize>,
@@ -106,9 +108,9 @@ impl Outcome {
     /// The measured order of each numeric knob, where enough of its errors are above the floor.
     pub(super) fn slopes(&self) -> Vec<Slope> {
         let of = |(place, knob): (usize, &Knob)| {
-            let floor = self.floor();
+            let least = self.floor().max(self.rounding);
             let point = |run: usize| {
-                let error = self.error(run).filter(|error| *error > 0.0 && *error >= floor)?;
+                let error = self.error(run).filter(|error| *error > 0.0 && *error >= least)?;
                 Some((knob.step_of(&knob.values[self.runs[run].setting[place]])?, error))
             };
             let points: Vec<(f64, f64)> = self.along(place).into_iter().filter_map(point).collect();
@@ -121,36 +123,33 @@ impl Outcome {
         self.knobs.iter().enumerate().filter_map(of).collect()
     }
 
-    /// Plain words where the maximum, or every statistic, does not converge.
+    /// Plain words where the maximum, or every statistic, does not converge: the two nearest references, which are the best
+    /// setting and what it is measured against, differ by about as much as coarser settings do.
     pub(super) fn chaos(&self) -> Option<String> {
-        let floor = self.floor.filter(|_| self.is_beyond)?;
         let best: Vec<usize> = self.knobs.iter().map(Knob::best).collect();
-        // The coarsest of the runs nearest to the best, one step away along a knob.
+        let at_best = self.floor.and(self.runs.iter().find(|run| run.setting == best))?.errors()?;
+        // The worst of the runs that are one value coarser along one knob.
         let steps = |run: &Run| run.setting.iter().zip(&best).map(|(value, best)| best - value).sum::<usize>();
         let near = self.runs.iter().filter(|run| steps(run) == 1).filter_map(Run::errors);
-        let near = near.fold(None, |most: Option<Errors>, errors| {
-            let most = most.unwrap_or(*errors);
-            Some(Errors {
-                mean: most.mean.max(errors.mean),
-                p99: most.p99.max(errors.p99),
-                max: most.max.max(errors.max),
-            })
+        let near = near.copied().reduce(|a, b| Errors {
+            mean: a.mean.max(b.mean),
+            p99: a.p99.max(b.p99),
+            max: a.max.max(b.max),
         })?;
-        let (unit, show) = (self.unit, crate::numbers::short);
-        if floor.max > 0.8 * near.max && floor.mean > 0.8 * near.mean && floor.mean > 0.0 {
+        let show = |error: f64| format!("{} {}", super::table::brief(error), self.unit).trim_end().to_owned();
+        if at_best.mean > 0.8 * near.mean && at_best.max > 0.8 * near.max && at_best.mean > self.rounding {
             return Some(format!(
-                "errors do not fall: the two best settings differ by {} {unit} on average, about as much as the next coarser one; \
-                 the scene is chaotic at these settings, or the knobs do not control its error",
-                show(floor.mean)
+                "errors do not fall: the two nearest references differ by {} on average, about as much as the next coarser \
+                 setting; the scene is chaotic at these settings, or the knobs do not control its error",
+                show(at_best.mean)
             ));
         }
-        (floor.max > 0.5 * near.max && floor.max > 20.0 * floor.mean).then(|| {
+        (at_best.max > 0.5 * near.max && at_best.max > 20.0 * at_best.mean && at_best.max > 20.0 * self.rounding).then(|| {
             format!(
-                "the maximum is chaotic: two nearby references differ by {} {unit} at the worst point but by {} {unit} on \
-                 average, and the maximum does not fall with finer settings, as where contacts are made or missed; judge by \
-                 the mean or p99",
-                show(floor.max),
-                show(floor.mean)
+                "the maximum is chaotic: the two nearest references differ by {} at the worst point but by {} on average, and \
+                 finer settings do not lower the maximum, as where a contact is made or missed; judge by the mean or p99",
+                show(at_best.max),
+                show(at_best.mean)
             )
         })
     }

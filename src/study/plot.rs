@@ -116,7 +116,7 @@ pub(super) fn svg(outcome: &Outcome) -> String {
         svg.text(
             [left + 8.0, (at + 16.0).min(bottom - 5.0)],
             r##"fill="#7a5c22" font-size="12""##,
-            &format!("floor {}", brief(floor)),
+            &format!("floor {} {}", brief(floor), outcome.unit),
         );
     }
     goal(&mut svg, outcome, &x, &y);
@@ -280,7 +280,7 @@ fn legend(svg: &mut Svg, outcome: &Outcome) {
         lines.push(format!("  {:.2} measured{declared}", slope.measured));
     }
     lines.push(match outcome.floor {
-        Some(_) => format!("floor: {}", brief(outcome.floor())),
+        Some(_) => format!("floor: {} {}", brief(outcome.floor()), outcome.unit),
         None => "floor: unknown".into(),
     });
     lines.extend(wrapped(&format!("reference: {}", outcome.why), 32));

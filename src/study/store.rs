@@ -37,6 +37,8 @@ pub(super) struct Stored {
     pub(super) reference: Vec<(String, String)>,
     pub(super) why: String,
     pub(super) is_beyond: bool,
+    /// What the storage of positions may change of an error.
+    pub(super) rounding: f64,
 }
 
 impl Store {
@@ -56,6 +58,7 @@ impl Store {
             reference: value["reference"].as_array()?.iter().map(pair).collect::<Option<_>>()?,
             why: value["why"].as_str()?.to_owned(),
             is_beyond: value["is_beyond"].as_bool()?,
+            rounding: value["rounding"].as_f64()?,
         })
     }
 
@@ -70,7 +73,7 @@ impl Store {
         let value = json!({
             "convect_study": 1, "key": self.key.to_string(), "reversed": stored.reversed,
             "floor": stored.floor.map(Errors::to_json), "reference": stored.reference, "why": stored.why,
-            "is_beyond": stored.is_beyond, "runs": stored.runs.iter().map(run_to_json).collect::<Vec<_>>(),
+            "is_beyond": stored.is_beyond, "rounding": stored.rounding, "runs": stored.runs.iter().map(run_to_json).collect::<Vec<_>>(),
         });
         write_whole(&self.path, format!("{value:#}\n").as_bytes())?;
         self.written = Stopwatch::start();
