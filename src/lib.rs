@@ -32,6 +32,7 @@ pub mod progress;
 pub mod report;
 pub mod schema;
 pub mod stats;
+pub mod study;
 pub mod targets;
 
 use engine::graph::Catalogue;

@@ -22,11 +22,19 @@ const LARGEST_GRAPH: u64 = 256 << 20;
 /// # Errors
 /// If the file cannot be read. Faults of the graph are in the inner result.
 pub fn graph(path: &Path, set: &[Setting]) -> Result<Result<Graph, Vec<Fault>>, Failure> {
+    Ok(loaded(&bytes(path)?, path, set))
+}
+
+/// The bytes of the graph file at `path`.
+///
+/// # Errors
+/// If the file cannot be read, or is too large for a graph.
+pub fn bytes(path: &Path) -> Result<Vec<u8>, Failure> {
     let mut bytes = Vec::new();
     if is_stdin(path) {
         let read = std::io::stdin().take(LARGEST_GRAPH + 1).read_to_end(&mut bytes);
         read.map_err(|error| Failure::file(format!("the graph could not be read from stdin: {error}")))?;
-        return loaded(&bytes, path, set);
+        return small_enough(bytes, path);
     }
     let file = engine::files::open(path).and_then(|file| {
         // Without it the buffer grows by doubling.
@@ -35,7 +43,15 @@ pub fn graph(path: &Path, set: &[Setting]) -> Result<Result<Graph, Vec<Fault>>, 
         file.take(LARGEST_GRAPH + 1).read_to_end(&mut bytes)
     });
     file.map_err(|error| Failure::file(format!("the graph {}", unreadable(path, &error).fact)))?;
-    loaded(&bytes, path, set)
+    small_enough(bytes, path)
+}
+
+fn small_enough(bytes: Vec<u8>, path: &Path) -> Result<Vec<u8>, Failure> {
+    if bytes.len() as u64 > LARGEST_GRAPH {
+        let fact = format!("the graph `{}` is larger than {} MiB", graph_name(path), LARGEST_GRAPH >> 20);
+        return Err(Failure::file(format!("{fact}; store geometry in separate files")));
+    }
+    Ok(bytes)
 }
 
 /// Whether a graph is to be read from stdin.
@@ -48,17 +64,16 @@ pub fn graph_name(path: &Path) -> String {
     if is_stdin(path) { "stdin".into() } else { path.display().to_string() }
 }
 
-/// The graph in the bytes of the file at `path`.
-fn loaded(bytes: &[u8], path: &Path, set: &[Setting]) -> Result<Result<Graph, Vec<Fault>>, Failure> {
-    if bytes.len() as u64 > LARGEST_GRAPH {
-        let fact = format!("the graph `{}` is larger than {} MiB", graph_name(path), LARGEST_GRAPH >> 20);
-        return Err(Failure::file(format!("{fact}; store geometry in separate files")));
-    }
+/// The graph in the bytes of the file at `path`, with some params and controls overridden.
+///
+/// # Errors
+/// All faults of the graph.
+pub fn loaded(bytes: &[u8], path: &Path, set: &[Setting]) -> Result<Graph, Vec<Fault>> {
     let folder =
         path.parent().filter(|_| !is_handed_over(path) && !is_stdin(path)).map_or_else(PathBuf::new, Path::to_owned);
     let set: Vec<(String, String)> = set.iter().map(|Setting(key, json)| (key.clone(), json.clone())).collect();
     let loaded = Graph::load_bytes(bytes, &folder, CATALOGUE, &set, &probe);
-    Ok(loaded.map_err(|faults| as_read_from(path, faults)))
+    loaded.map_err(|faults| as_read_from(path, faults))
 }
 
 /// The faults of the graph at `path` with hints that fit where it was read from: stdin has no folder.

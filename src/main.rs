@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use convect::failure::{Exit, Failure, too_large_files_are_errors};
 use convect::say;
-use convect::{check, completions, convert, cook, diff, explain, functions, nodes, schema, stats};
+use convect::{check, completions, convert, cook, diff, explain, functions, nodes, schema, stats, study};
 
 /// Keeps the pages of large arrays between frames. The system's allocator returns them at once, and requesting them
 /// again costs a third of the time of a frame of a million curves.
@@ -29,6 +29,8 @@ enum Verb {
     Stats(stats::StatsArgs),
     /// Compare two geometries: exit code 0 if they are the same, 1 if they differ, 2 on errors
     Diff(diff::DiffArgs),
+    /// Plot error against run time over the values of params, and write the graph with the best settings
+    Study(Box<study::StudyArgs>),
     /// Convert geometry files from one format to another
     Convert(convert::ConvertArgs),
     /// Print the reference of the expression language: names, operators, functions
@@ -78,6 +80,7 @@ fn run(verb: &Verb) -> Result<(), Failure> {
         Verb::Nodes(args) => nodes::run(args),
         Verb::Stats(args) => stats::run(args),
         Verb::Diff(args) => diff::run(args),
+        Verb::Study(args) => study::run(args),
         Verb::Convert(args) => convert::run(args),
         Verb::Functions => functions::run(),
         Verb::Schema => schema::run(),

@@ -30,8 +30,8 @@ pub mod prelude {
         Runs, SHIELDED, THICKNESS, Topology, UVW, V, Volume, WIDTH,
     };
     pub use crate::node::{
-        AttrDecl, AttrNames, Chain, Cook, CurveLoop, Cx, Edited, Fill, FrameCx, Input, LeftOut, Many, Metric,
-        MetricValues, Node, Opt, Output, Outputs, Past, Resumable, StepCx, Times, Wires, point_float_hint,
+        Accuracy, AttrDecl, AttrNames, Chain, Cook, CurveLoop, Cx, Edited, Fill, FrameCx, Input, LeftOut, Many, Metric,
+        MetricValues, Node, Opt, Output, Outputs, Past, Resumable, StepCx, Times, Trials, Wires, point_float_hint,
         point_floats_hint,
     };
     pub use crate::param::{Clock, Code, Maskable, Param, Params, Seed, Span, Turn, Unit};

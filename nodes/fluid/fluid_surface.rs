@@ -34,6 +34,7 @@ pub(crate) static NODE: Node = Node::new(
 )
 .inputs(INPUTS)
 .params(PARAMS)
+.accuracy(&[Accuracy::larger("resolution", Trials::These(&["1", "2", "4"]))])
 .outputs(&[&SURFACE])
 .writes(&[&P, &N, &V, &THICKNESS])
 .changes_topology();

@@ -255,6 +255,12 @@ pub(crate) static NODE: Node = Node::new(
 )
 .inputs(INPUTS)
 .params(PARAMS)
+.accuracy(&[
+    Accuracy::smaller("cell", Trials::Times(&[4.0, 2.0, 1.0])),
+    Accuracy::smaller("cfl", Trials::These(&["4", "2", "1", "0.5"])),
+    Accuracy::smaller("tolerance", Trials::These(&["1e-2", "1e-3", "1e-4", "1e-5"])),
+    Accuracy::larger("resolution", Trials::These(&["1", "2", "4"])),
+])
 .outputs(&[&SURFACE, &PARTICLES, &VOLUME])
 .reads(&[
     &P,

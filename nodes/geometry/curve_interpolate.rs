@@ -71,6 +71,7 @@ pub(crate) static NODE: Node = Node::new(
 )
 .inputs(INPUTS)
 .params(PARAMS)
+.accuracy(&[Accuracy::larger("cvs", Trials::These(&["3", "5", "9", "17", "33"]))])
 .outputs(&[&CURVES])
 .writes(&[&P, &PREF, &CURVE_ID])
 .attributes(|_| [AttrNames::All, AttrNames::All])

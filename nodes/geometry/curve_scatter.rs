@@ -62,6 +62,7 @@ pub(crate) static NODE: Node = Node::new(
 )
 .inputs(INPUTS)
 .params(PARAMS)
+.accuracy(&[Accuracy::larger("cvs", Trials::These(&["3", "5", "9", "17", "33"]))])
 .outputs(&[&CURVES])
 .reads(&[&P, &N, &UVW])
 .writes(&[&P, &PREF, &UVW, &WIDTH, &CURVE_ID])

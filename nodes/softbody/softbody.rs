@@ -260,6 +260,11 @@ pub(crate) static NODE: Node = Node::new(
 )
 .inputs(INPUTS)
 .params(PARAMS)
+.accuracy(&[
+    Accuracy::larger("substeps", Trials::These(&["1", "2", "4", "8"])).order(2.0),
+    Accuracy::words("integrator", &["euler", "default", "accurate"]),
+    Accuracy::smaller("tolerance", Trials::These(&["1e-2", "1e-3", "1e-4"])).needs("integrator", "accurate"),
+])
 .outputs(&[&SURFACE, &TETS])
 .reads(&[
     &P,

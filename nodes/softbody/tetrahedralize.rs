@@ -99,6 +99,7 @@ pub(crate) static NODE: Node = Node::new(
 )
 .inputs(INPUTS)
 .params(PARAMS)
+.accuracy(&[Accuracy::smaller("spacing", Trials::Times(&[4.0, 2.0, 1.0]))])
 .outputs(&[&TETS])
 .reads(&[&P])
 .writes(&[&P, &SURFACE_POINT, &SIDE, &BODY_NUMBER, &SLIVER])

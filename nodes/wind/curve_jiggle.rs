@@ -85,6 +85,7 @@ pub(crate) static NODE: Node = Node::new(
 )
 .inputs(INPUTS)
 .params(PARAMS)
+.accuracy(&[Accuracy::smaller("tolerance", Trials::These(&["1e-1", "1e-2", "1e-3", "1e-4", "1e-5"])).order(1.0)])
 .outputs(&[&OUT])
 .reads(&[&P])
 .writes(&[&P])

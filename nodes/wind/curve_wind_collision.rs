@@ -121,6 +121,13 @@ pub(crate) static NODE: Node = Node::new(
 )
 .inputs(INPUTS)
 .params(PARAMS)
+.accuracy(&[
+    Accuracy::larger("rotation_steps", Trials::These(&["2", "4", "8", "16", "32", "64"]))
+        .order(1.0)
+        .exact("method", "exact")
+        .needs("method", "steps"),
+    Accuracy::words("method", &["steps", "exact"]),
+])
 .outputs(&[&OUT])
 .reads(&[&P])
 .writes(&[&P, &UNFREED_SEGMENTS])

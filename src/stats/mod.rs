@@ -2,7 +2,7 @@
 
 mod measure;
 mod show;
-mod surface;
+pub(crate) mod surface;
 
 use std::io::Write as _;
 use std::path::PathBuf;

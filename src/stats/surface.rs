@@ -9,7 +9,7 @@ use numerics::vector::{DVec3, to_f64};
 
 /// Edges, area and volume.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct SurfaceStats {
+pub(crate) struct SurfaceStats {
     /// Corners of each face.
     pub(super) corners: Vec<u32>,
     /// Number of distinct edges.
@@ -26,12 +26,12 @@ pub(super) struct SurfaceStats {
     pub(super) area: f64,
     /// m³, positive if faces are counter-clockwise seen from outside; `None` if the surface is not closed, that is, if
     /// an edge is not used equally often in both directions.
-    pub(super) volume: Option<f64>,
+    pub(crate) volume: Option<f64>,
 }
 
 impl SurfaceStats {
     /// Measures `faces` with these `positions`.
-    pub(super) fn of(faces: &Faces, positions: &[[f32; 3]]) -> Self {
+    pub(crate) fn of(faces: &Faces, positions: &[[f32; 3]]) -> Self {
         let mut edges = directed_edges(faces);
         edges.sort_unstable();
         let mut surface = Self {
@@ -100,7 +100,7 @@ fn directed_edges(faces: &Faces) -> Vec<Edge> {
 }
 
 /// The volume of a tet in m³, with the sign of (b−a)×(c−a)·(d−a).
-pub(super) fn tet_volume([a, b, c, d]: [[f32; 3]; 4]) -> f64 {
+pub(crate) fn tet_volume([a, b, c, d]: [[f32; 3]; 4]) -> f64 {
     let [b, c, d] = [b, c, d].map(|corner| to_f64(corner) - to_f64(a));
     b.cross(&c).dot(&d) / 6.0
 }

@@ -19,4 +19,5 @@ mod same_bits;
 mod stats;
 #[cfg(unix)]
 mod stopped;
+mod study;
 mod targets;

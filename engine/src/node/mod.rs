@@ -1,6 +1,7 @@
 //! Node declarations: everything that the engine, the help, the schema and the conformance suite know of a node is
 //! declared in a single static, made of typed handles. The only registration is a line in the family's list.
 
+mod accuracy;
 mod chain;
 mod curves;
 mod cx;
@@ -14,6 +15,7 @@ mod ports;
 use crate::geometry::{Attr, ColumnType, Geometry, Item, Name, Owner};
 use crate::param::{Clock, ParamDecl, ParamSpec, Params};
 
+pub use accuracy::{Accuracy, Finer, Trials};
 pub use chain::{Chain, Past, Resumable, Solver};
 pub(crate) use chain::{ChainFns, SavedFns, StateBox};
 pub use curves::{CurveLoop, CurveView, Cv, MovedCurves};
@@ -152,6 +154,8 @@ pub struct Node {
     pub integrands: [Option<Integrand>; MOST_INTEGRANDS],
     /// Restores what interpolation between a window's frames does not keep; see [`Node::restores_between`].
     pub restore_between: Option<RestoreBetween>,
+    /// Params that trade accuracy for time.
+    pub accuracy: &'static [Accuracy],
 }
 
 /// Corrects an output of a window between two whole frames, at `share` (0..1) from the first, whose outputs are `near`.
@@ -181,6 +185,7 @@ impl Node {
             checks: None,
             integrands: [None; MOST_INTEGRANDS],
             restore_between: None,
+            accuracy: &[],
         }
     }
 
@@ -281,6 +286,13 @@ impl Node {
     #[must_use]
     pub const fn restores_between(mut self, restore: RestoreBetween) -> Self {
         self.restore_between = Some(restore);
+        self
+    }
+
+    /// Params that trade accuracy for time, the most effective first.
+    #[must_use]
+    pub const fn accuracy(mut self, accuracy: &'static [Accuracy]) -> Self {
+        self.accuracy = accuracy;
         self
     }
 

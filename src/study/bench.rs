@@ -1,0 +1,276 @@
+//! Runs: cooks a setting, measures its time, and its error against the reference.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+
+use engine::clock::Stopwatch;
+use engine::cook::{Delivered, Report, Stopped};
+use engine::geometry::Geometry;
+use engine::graph::{Fault, Graph, fault::code};
+use engine::memory::Ceiling;
+use engine::plan::Request;
+use engine::time::Frame;
+
+use super::knobs::{Knob, settings};
+use super::norms::{Errors, Measure, Norm};
+use crate::failure::{Exit, Failure};
+use crate::load;
+use crate::progress::Progress;
+
+/// Why a study stops.
+#[derive(Debug)]
+pub(super) enum Stop {
+    Failure(Failure),
+    /// Ctrl-C.
+    Interrupted,
+}
+
+impl From<Failure> for Stop {
+    fn from(failure: Failure) -> Self {
+        Self::Failure(failure)
+    }
+}
+
+/// Everything that the runs of a study share.
+pub(super) struct Subject<'a> {
+    pub(super) bytes: &'a [u8],
+    pub(super) path: &'a Path,
+    /// What `--set` overrides in all runs, and what the knobs need.
+    pub(super) fixed: Vec<(String, String)>,
+    pub(super) request: Request,
+    pub(super) norm: Norm,
+    pub(super) threads: usize,
+    pub(super) ceiling: Ceiling,
+    pub(super) cancel: Arc<AtomicBool>,
+    pub(super) progress: Progress,
+}
+
+/// Time and memory of a run; times are milliseconds a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Cost {
+    pub(super) ms: f64,
+    pub(super) cpu_ms: f64,
+    pub(super) peak_bytes: usize,
+    /// Wall time by node, in the order of the graph.
+    pub(super) nodes: Vec<(String, f64)>,
+    /// How many times it was cooked.
+    pub(super) repeats: u32,
+}
+
+impl Cost {
+    /// The least of both times.
+    fn at_least(&mut self, other: &Self) {
+        self.ms = self.ms.min(other.ms);
+        self.cpu_ms = self.cpu_ms.min(other.cpu_ms);
+        for ((_, ms), (_, again)) in self.nodes.iter_mut().zip(&other.nodes) {
+            *ms = ms.min(*again);
+        }
+        self.repeats += 1;
+    }
+}
+
+/// A setting that was cooked.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Run {
+    /// The index of each knob's value.
+    pub(super) setting: Vec<usize>,
+    /// Cost and error, or why it failed.
+    pub(super) result: Result<(Cost, Errors), String>,
+}
+
+impl Run {
+    pub(super) fn cost(&self) -> Option<&Cost> {
+        self.result.as_ref().ok().map(|(cost, _)| cost)
+    }
+
+    pub(super) fn errors(&self) -> Option<&Errors> {
+        self.result.as_ref().ok().map(|(_, errors)| errors)
+    }
+}
+
+/// The result that runs are compared with.
+#[derive(Default)]
+pub(super) struct Reference {
+    frames: BTreeMap<Frame, Arc<Geometry>>,
+    metric: BTreeMap<Frame, f64>,
+}
+
+impl Reference {
+    /// The largest coordinate: that which f32 stores least precisely.
+    pub(super) fn largest_coordinate(&self) -> f32 {
+        let of_frame = |geometry: &Arc<Geometry>| {
+            let numbers = geometry.parts().flat_map(|part| part.positions().as_flattened().iter().copied());
+            numbers.fold(0.0_f32, |largest, x| largest.max(x.abs()))
+        };
+        self.frames.values().map(of_frame).fold(0.0, f32::max)
+    }
+}
+
+/// What came of a cook.
+pub(super) enum Cooked<T> {
+    Done(T),
+    /// Why it could not be cooked.
+    Failed(String),
+}
+
+impl Subject<'_> {
+    /// The graph with these settings; a fault of a value is a failed run, a fault of a name a failure of the command.
+    fn graph(&self, set: &[(String, String)]) -> Result<Cooked<Graph>, Failure> {
+        let set: Vec<_> = self.fixed.iter().chain(set).cloned().collect();
+        let faults = match load::loaded(self.bytes, self.path, &settings(&set)) {
+            Ok(graph) => return Ok(Cooked::Done(graph)),
+            Err(faults) => faults,
+        };
+        let is_of_name = |code: &str| [code::UNKNOWN_SET, code::UNKNOWN_NODE, code::UNKNOWN_PARAM].contains(&code);
+        match faults.iter().find(|fault| fault.set.is_none() || is_of_name(fault.code)) {
+            Some(_) => {
+                let mut failure = load::faulty(self.path, &faults);
+                failure.lines.iter_mut().for_each(|line| *line = line.replacen("--set ", "--knob ", 1));
+                Err(failure)
+            }
+            None => {
+                // Without its position, which is in the value alone.
+                let fault = faults.into_iter().next().map(|fault| Fault { line: 0, ..fault });
+                Ok(Cooked::Failed(fault.map(|fault| fault.to_string()).unwrap_or_default()))
+            }
+        }
+    }
+
+    /// Cooks a setting, and hands its frames to `take`; the time of `take` is not counted.
+    fn cook(
+        &self,
+        set: &[(String, String)],
+        take: &mut (dyn FnMut(&Delivered) -> Result<(), Failure> + Send),
+    ) -> Result<Cooked<(Cost, Report)>, Stop> {
+        let graph = match self.graph(set)? {
+            Cooked::Done(graph) => graph,
+            Cooked::Failed(why) => return Ok(Cooked::Failed(why)),
+        };
+        // A new engine has nothing cooked but the sources, which the check reads: loading is not counted.
+        let engine = load::engine(self.threads, self.ceiling)?;
+        if let Some(fault) = engine.verify(&graph, Some(&self.request)).first() {
+            return Ok(Cooked::Failed(fault.to_string()));
+        }
+        let mut taking = Duration::ZERO;
+        let mut sink = |finished: &[Delivered]| -> Result<(), Failure> {
+            let watch = Stopwatch::start();
+            finished.iter().try_for_each(&mut *take)?;
+            taking += watch.cpu();
+            self.progress.add(finished.len() as u64);
+            Ok(())
+        };
+        let report = match engine.cook(&graph, &self.request, None, &self.cancel, &mut sink) {
+            Ok(report) => report,
+            Err(Stopped::Asked(error)) => return Ok(Cooked::Failed(error.to_string())),
+            Err(Stopped::Sink(failure)) => return Err(failure.into()),
+        };
+        if report.cancelled {
+            return Err(Stop::Interrupted);
+        }
+        if let Some((_, error, _)) = report.errors.first() {
+            return Ok(Cooked::Failed(error.to_string()));
+        }
+        Ok(Cooked::Done((self.cost(&graph, &report, taking), report)))
+    }
+
+    fn cost(&self, graph: &Graph, report: &Report, taking: Duration) -> Cost {
+        let frames = self.request.frames.len().max(1) as f64;
+        let ms = |time: Duration| time.as_secs_f64() * 1e3 / frames;
+        // A still source was read before the cook.
+        let is_loaded =
+            |place: usize| graph.nodes[place].inputs().iter().all(Vec::is_empty) && !report.nodes[place].varies;
+        let node = |(place, node): (usize, &engine::cook::NodeReport)| {
+            let id = node.id.as_ref()?.to_string();
+            node.needed.then(|| (id, if is_loaded(place) { 0.0 } else { ms(node.wall) }))
+        };
+        Cost {
+            ms: ms(report.cooking),
+            cpu_ms: ms(report.cpu.saturating_sub(taking)),
+            peak_bytes: report.peak_bytes,
+            nodes: report.nodes.iter().enumerate().filter_map(node).collect(),
+            repeats: 1,
+        }
+    }
+
+    /// Cooks the reference.
+    pub(super) fn reference(&self, set: &[(String, String)]) -> Result<Cooked<Reference>, Stop> {
+        let mut reference = Reference::default();
+        let mut take = |one: &Delivered| {
+            reference.frames.insert(one.frame, one.geometry.clone());
+            Ok(())
+        };
+        match self.cook(set, &mut take)? {
+            Cooked::Failed(why) => Ok(Cooked::Failed(why)),
+            Cooked::Done((_, report)) => {
+                reference.metric = self.metric(&report);
+                Ok(Cooked::Done(reference))
+            }
+        }
+    }
+
+    /// Cooks a setting of the knobs and measures its error.
+    pub(super) fn run(&self, knobs: &[Knob], setting: &[usize], reference: &Reference) -> Result<Run, Stop> {
+        let mut differences = Vec::new();
+        let measure = &self.norm.measure;
+        let mut take = |one: &Delivered| {
+            let Some(of_reference) = reference.frames.get(&one.frame) else { return Ok(()) };
+            measure
+                .compare(&one.geometry, of_reference, &mut differences)
+                .map_err(|why| not_comparable(measure, one.frame, &why))
+        };
+        let cooked = self.cook(&set_of(knobs, setting), &mut take)?;
+        let failed = |why: String| Run { setting: setting.to_vec(), result: Err(why) };
+        let (cost, report) = match cooked {
+            Cooked::Failed(why) => return Ok(failed(why)),
+            Cooked::Done(done) => done,
+        };
+        if let Measure::Metric { node, metric } = measure {
+            let own = self.metric(&report);
+            if own.is_empty() {
+                let line = format!("--norm: `{node}` published no `{metric}` in these frames");
+                return Err(Failure::new(Exit::CommandLine, line).into());
+            }
+            let both = own.iter().filter_map(|(frame, value)| Some(value - reference.metric.get(frame)?));
+            differences = both.map(f64::abs).collect();
+        }
+        Ok(match Errors::of(differences) {
+            Some(errors) => Run { setting: setting.to_vec(), result: Ok((cost, errors)) },
+            None => failed("the output has nothing to compare in these frames".into()),
+        })
+    }
+
+    /// Cooks a run once more, for its time.
+    pub(super) fn repeat(&self, knobs: &[Knob], run: &mut Run) -> Result<(), Stop> {
+        let Ok((cost, _)) = &mut run.result else { return Ok(()) };
+        if let Cooked::Done((again, _)) = self.cook(&set_of(knobs, &run.setting), &mut |_| Ok(()))? {
+            cost.at_least(&again);
+        }
+        Ok(())
+    }
+
+    /// The metric of the norm, by frame.
+    fn metric(&self, report: &Report) -> BTreeMap<Frame, f64> {
+        let Measure::Metric { node, metric } = &self.norm.measure else { return BTreeMap::new() };
+        let found = report.nodes.iter().find(|found| found.id.as_ref().is_some_and(|id| **id == **node));
+        found.and_then(|found| found.metrics.get(metric.as_str())).cloned().unwrap_or_default()
+    }
+}
+
+/// The params of a setting.
+pub(super) fn set_of(knobs: &[Knob], setting: &[usize]) -> Vec<(String, String)> {
+    knobs.iter().zip(setting).map(|(knob, index)| (knob.key.clone(), knob.values[*index].clone())).collect()
+}
+
+/// Results that the norm cannot compare make the whole study useless, not only a run.
+fn not_comparable(measure: &Measure, frame: Frame, why: &str) -> Failure {
+    let hint = match measure {
+        Measure::Points | Measure::Attribute(_) => {
+            "; where points come and go, use --norm surface, which measures distances between surfaces, or volume"
+        }
+        _ => "",
+    };
+    Failure::new(Exit::CommandLine, format!("--norm {}: at frame {frame} {why}{hint}", measure.name()))
+}

@@ -1,0 +1,308 @@
+//! The course of a study: the reference, the runs, their repetitions.
+
+use std::path::Path;
+
+use engine::graph::Graph;
+
+use super::bench::{Cooked, Reference, Run, Stop, Subject, set_of};
+use super::knobs::Knob;
+use super::norms::{Errors, Measure};
+use super::outcome::Goal;
+use super::search;
+use super::store::{Store, Stored};
+use crate::failure::{Exit, Failure};
+
+/// How often each setting is cooked, unless `--repeats` says it.
+pub(super) const REPEATS: u32 = 3;
+
+/// Without `--repeats`, a setting is cooked again while all its cooks take less than this, in milliseconds.
+const LONG: f64 = 6e3;
+
+/// The first value of a knob costs this many times the last, in CPU time of its node, where the values are taken to be given
+/// from fine to coarse.
+const REVERSED: f64 = 1.5;
+
+/// Times shorter than this, in milliseconds a frame, say nothing about the order of values.
+const NOISE: f64 = 0.2;
+
+/// What the knobs need besides: key, setting, and the knob's key.
+pub(super) fn needs(knobs: &[Knob], graph: &Graph) -> Vec<(String, String, String)> {
+    let is_knob = |key: &str| knobs.iter().any(|knob| knob.key == key);
+    let need = |knob: &Knob| knob.unmet_need(graph).map(|(key, value)| (key, value, knob.key.clone()));
+    let mut needs: Vec<_> = knobs.iter().filter_map(need).filter(|(key, _, _)| !is_knob(key)).collect();
+    needs.dedup_by(|a, b| a.0 == b.0);
+    needs
+}
+
+/// The most cooks that a study takes, for the progress.
+pub(super) fn planned_runs(knobs: &[Knob], repeats: u32) -> usize {
+    1 + search::grid_size(knobs).unwrap_or(search::MOST_RUNS) * repeats as usize
+}
+
+/// A study in progress.
+pub(super) struct Study<'a> {
+    subject: &'a Subject<'a>,
+    knobs: Vec<Knob>,
+    goal: Goal,
+    repeats: Option<u32>,
+    store: Store,
+    stored: Stored,
+    reference: Option<Reference>,
+}
+
+/// What a study found.
+pub(super) struct Found {
+    pub(super) knobs: Vec<Knob>,
+    pub(super) stored: Stored,
+}
+
+impl<'a> Study<'a> {
+    pub(super) fn new(
+        subject: &'a Subject<'a>,
+        knobs: Vec<Knob>,
+        goal: Goal,
+        graph: &Graph,
+        store: &Path,
+        repeats: Option<u32>,
+    ) -> Self {
+        let store = Store::new(store.to_owned(), subject, &knobs, graph);
+        let stored = Stored { reversed: vec![false; knobs.len()], ..Stored::default() };
+        Self { subject, knobs, goal, repeats, store, stored, reference: None }
+    }
+
+    /// Takes the runs of an earlier study with the same key; whether there are any.
+    pub(super) fn resume(&mut self) -> bool {
+        let Some(stored) = self.store.load() else { return false };
+        let fits = |run: &Run| {
+            run.setting.len() == self.knobs.len()
+                && run.setting.iter().zip(&self.knobs).all(|(value, knob)| *value < knob.values.len())
+        };
+        if stored.reversed.len() != self.knobs.len() || !stored.runs.iter().all(fits) {
+            return false;
+        }
+        self.reverse(&stored.reversed);
+        self.stored = stored;
+        !self.stored.runs.is_empty()
+    }
+
+    /// The number of settings cooked so far.
+    pub(super) fn runs(&self) -> usize {
+        self.stored.runs.len()
+    }
+
+    fn reverse(&mut self, reversed: &[bool]) {
+        for (knob, reversed) in self.knobs.iter_mut().zip(reversed) {
+            if *reversed {
+                knob.values.reverse();
+            }
+        }
+    }
+
+    /// Cooks what is missing; whether it was interrupted.
+    ///
+    /// # Errors
+    /// If the graph, the norm or a file is wrong.
+    pub(super) fn measure(&mut self) -> Result<bool, Failure> {
+        match self.all_runs() {
+            Ok(()) => Ok(false),
+            Err(Stop::Interrupted) => Ok(true),
+            Err(Stop::Failure(failure)) => Err(failure),
+        }
+    }
+
+    fn all_runs(&mut self) -> Result<(), Stop> {
+        self.settings()?;
+        let reversed: Vec<bool> = (0..self.knobs.len()).map(|place| self.is_reversed(place)).collect();
+        if reversed.contains(&true) {
+            // All errors were measured against the wrong end.
+            self.reverse(&reversed);
+            self.stored = Stored { reversed, ..Stored::default() };
+            self.reference = None;
+            self.settings()?;
+        }
+        let most = self.repeats.unwrap_or(REPEATS);
+        for round in 1..most {
+            for place in 0..self.stored.runs.len() {
+                let frames = self.subject.request.frames.len() as f64;
+                let run = &mut self.stored.runs[place];
+                let Some(cost) = run.cost() else { continue };
+                let is_long = self.repeats.is_none() && cost.ms * frames * f64::from(cost.repeats) > LONG;
+                if cost.repeats > round || is_long {
+                    continue;
+                }
+                self.subject.repeat(&self.knobs, run)?;
+                self.store.save(&self.stored, false)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Cooks each setting once.
+    fn settings(&mut self) -> Result<(), Stop> {
+        let best = search::best(&self.knobs);
+        // First, because it gives the floor.
+        self.once(&best)?;
+        let knobs = self.knobs.clone();
+        if search::grid_size(&knobs).is_some() {
+            return search::grid(&knobs).iter().try_for_each(|setting| self.once(setting).map(|_| ()));
+        }
+        let floor = |study: &Self| study.stored.floor.map_or(0.0, |floor| floor.get(study.subject.norm.statistic));
+        let (goal, floor) = (self.goal, floor(self));
+        let score = move |error: f64, ms: f64| match goal {
+            Goal::Tolerance(tolerance) => [(error.max(floor) - tolerance).max(0.0), ms],
+            Goal::Budget(budget) => [(ms - budget).max(0.0), error.max(floor)],
+            Goal::None => [f64::INFINITY; 2],
+        };
+        let mut measure = |setting: &[usize]| {
+            let statistic = self.subject.norm.statistic;
+            let run = self.once(setting)?;
+            Ok(run.result.as_ref().ok().map(|(cost, errors)| (errors.get(statistic), cost.ms)))
+        };
+        search::search(&knobs, &score, &mut measure)
+    }
+
+    /// The run of a setting, cooked unless it was already.
+    fn once(&mut self, setting: &[usize]) -> Result<&Run, Stop> {
+        let place = match self.stored.runs.iter().position(|run| run.setting == setting) {
+            Some(place) => place,
+            None => {
+                self.make_reference()?;
+                let Some(reference) = &self.reference else { return Err(Stop::Interrupted) };
+                let run = self.subject.run(&self.knobs, setting, reference)?;
+                if setting == search::best(&self.knobs) && self.stored.is_beyond {
+                    self.stored.floor = run.errors().copied();
+                }
+                self.stored.runs.push(run);
+                self.store.save(&self.stored, false)?;
+                self.stored.runs.len() - 1
+            }
+        };
+        Ok(&self.stored.runs[place])
+    }
+
+    /// Cooks the reference, unless that was done: an exact method, else one value beyond the best of each knob, else the
+    /// best, else the finest setting that can be cooked.
+    fn make_reference(&mut self) -> Result<(), Stop> {
+        if self.reference.is_some() {
+            return Ok(());
+        }
+        let knobs = &self.knobs;
+        let is_knob = |key: &str| knobs.iter().any(|knob| knob.key == key);
+        let mut set = set_of(knobs, &search::best(knobs));
+        let (mut exact, mut beyond, mut without) = (Vec::new(), Vec::new(), Vec::new());
+        for (knob, (_, value)) in knobs.iter().zip(&mut set) {
+            if let Some((key, word)) = knob.exact().filter(|(key, _)| !is_knob(key)) {
+                exact.push((key, word));
+            } else if let Some(next) = knob.beyond() {
+                beyond.push(format!("{} {next}", knob.key));
+                *value = next;
+            } else {
+                without.push(knob.key.as_str());
+            }
+        }
+        set.extend(exact.iter().cloned());
+        let described = |pairs: &[(String, String)]| {
+            pairs.iter().map(|(key, value)| format!("{key} {value}")).collect::<Vec<_>>().join(", ")
+        };
+        if !exact.is_empty() || !beyond.is_empty() {
+            match self.subject.reference(&set)? {
+                Cooked::Done(reference) => {
+                    let is_exact = beyond.is_empty() && without.is_empty();
+                    let mut why = match is_exact {
+                        true => format!("exact: {}; the floor is the rounding of stored positions", described(&exact)),
+                        false => format!(
+                            "one beyond the best setting: {}; the floor is the best setting's difference from it",
+                            beyond
+                                .iter()
+                                .cloned()
+                                .chain(exact.iter().map(|(key, word)| format!("{key} {word}")))
+                                .collect::<Vec<_>>()
+                                .join(", ")
+                        ),
+                    };
+                    if !without.is_empty() {
+                        why += &format!(" (nothing is beyond the best of {})", without.join(", "));
+                    }
+                    self.stored.is_beyond = !is_exact;
+                    self.stored.rounding = rounding(&reference, &self.subject.norm.measure);
+                    let rounding = self.stored.rounding;
+                    self.stored.floor = is_exact.then_some(Errors { mean: rounding, p99: rounding, max: rounding });
+                    (self.stored.reference, self.stored.why, self.reference) = (set, why, Some(reference));
+                    return Ok(());
+                }
+                Cooked::Failed(failed) => return self.make_finest_reference(&format!("beyond it: {failed}")),
+            }
+        }
+        self.make_finest_reference("nothing is beyond it")
+    }
+
+    /// Takes the finest setting that can be cooked.
+    fn make_finest_reference(&mut self, reason: &str) -> Result<(), Stop> {
+        (self.stored.is_beyond, self.stored.floor) = (false, None);
+        let best = search::best(&self.knobs);
+        let mut settings = match search::grid_size(&self.knobs) {
+            Some(_) => search::grid(&self.knobs),
+            None => vec![best.clone()],
+        };
+        settings.sort_by_key(|setting| best.iter().zip(setting).map(|(best, value)| best - value).sum::<usize>());
+        let mut last = String::new();
+        for setting in settings {
+            let set = set_of(&self.knobs, &setting);
+            match self.subject.reference(&set)? {
+                Cooked::Done(reference) => {
+                    let what = if setting == best {
+                        "the best setting itself"
+                    } else {
+                        "the finest setting that can be cooked"
+                    };
+                    let why = format!("{what}, whose own error is unknown ({reason})");
+                    (self.stored.reference, self.stored.why, self.reference) = (set, why, Some(reference));
+                    return Ok(());
+                }
+                Cooked::Failed(why) => last = why,
+            }
+        }
+        Err(Failure::new(Exit::Cook, format!("no setting could be cooked: {last}")).into())
+    }
+
+    /// Whether times show that a numeric knob's values were given from fine to coarse.
+    fn is_reversed(&self, place: usize) -> bool {
+        let knob = &self.knobs[place];
+        if knob.accuracy.is_some() || knob.numbers().is_none() || self.stored.reversed[place] {
+            return false;
+        }
+        let best = search::best(&self.knobs);
+        let time_of = |value: usize| {
+            let mut setting = best.clone();
+            setting[place] = value;
+            let run = self.stored.runs.iter().find(|run| run.setting == setting)?;
+            let node = run.cost()?.nodes.iter().find(|(id, _)| *id == knob.node)?;
+            Some(node.1)
+        };
+        match (time_of(0), time_of(knob.best())) {
+            (Some(first), Some(last)) => first > NOISE && first >= REVERSED * last,
+            _ => false,
+        }
+    }
+
+    /// Writes the runs, and returns them in the order of the grid.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub(super) fn finish(mut self) -> Result<Found, Failure> {
+        self.store.save(&self.stored, true)?;
+        self.stored.runs.sort_by(|a, b| a.setting.cmp(&b.setting));
+        Ok(Found { knobs: self.knobs, stored: self.stored })
+    }
+}
+
+/// What the storage of positions may change of an error: four units in the last place of the largest coordinate; nothing of
+/// what is not a length.
+fn rounding(reference: &Reference, measure: &Measure) -> f64 {
+    let largest = reference.largest_coordinate();
+    let ulp = f64::from(largest.next_up()) - f64::from(largest);
+    match measure {
+        Measure::Points | Measure::Surface => 4.0 * ulp,
+        Measure::Volume | Measure::Attribute(_) | Measure::Metric { .. } => 0.0,
+    }
+}

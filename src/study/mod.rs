@@ -1,0 +1,332 @@
+//! `convect study`: error against run time of a graph, over the values of its params.
+//!
+//! Every run is cooked by a new engine without a cache on disk, so none is free because of another. All runs are compared
+//! with one reference, beyond the best of them; how far the best is from it is the floor, below which nothing is claimed.
+
+mod bench;
+mod knobs;
+mod measure;
+mod nearest;
+mod norms;
+mod outcome;
+mod plot;
+mod propose;
+mod search;
+mod store;
+mod table;
+mod tune;
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use engine::graph::Graph;
+use engine::plan::Request;
+use engine::time::Frame;
+
+use crate::args::{Frames, Setting, Size};
+use crate::failure::{Exit, Failure, cancelled_by_signal};
+use crate::output::{create_folder, write_whole};
+use crate::progress::Progress;
+use crate::targets::Targets;
+use crate::{load, memory};
+use bench::Subject;
+use knobs::{Knob, KnobArg};
+use measure::Study;
+use norms::Norm;
+use outcome::{Goal, Outcome};
+
+/// The arguments of `study`.
+#[derive(Debug, clap::Args)]
+pub struct StudyArgs {
+    /// The graph file; - reads it from stdin
+    graph: PathBuf,
+    /// A param and the values to compare, from coarse to fine: wind.rotation_steps=4,8,16; repeatable. The last value counts as
+    /// the best, unless the node declares the other direction or the times show it. Runs are compared with a reference one
+    /// step beyond the best, or with an exact method where the node has one. Without knobs, the graph's are listed
+    #[arg(long = "knob", value_name = "NODE.PARAM=V,V,…")]
+    knobs: Vec<KnobArg>,
+    /// The output to compare [default: the only one]
+    #[arg(long, value_name = "NAME")]
+    output: Option<String>,
+    /// Frames to cook: 1-48, 1-48x2 (every second), 10, 10.5, 1- (to the scene's end), or a list: 1-4,10 [default: the scene's frames]
+    #[arg(long, value_name = "FRAMES", allow_hyphen_values = true)]
+    frames: Option<Frames>,
+    /// What is compared: points (distances of points, by id where there is one), surface (distances between surfaces, both
+    /// ways), volume, an attribute or NODE.METRIC; and which statistic counts: mean, p99 or max. Repeatable, or separated by
+    /// commas: --norm surface,p99
+    #[arg(long, value_name = "NORM", value_delimiter = ',', default_value = "points,mean")]
+    norm: Vec<String>,
+    /// Write the graph with the cheapest values whose error is at most this, in the norm's unit
+    #[arg(long, value_name = "E", value_parser = positive, conflicts_with = "budget")]
+    tolerance: Option<f64>,
+    /// Write the graph with the most accurate values that take at most this per frame: 20ms, 1.5s
+    #[arg(long, value_name = "TIME")]
+    budget: Option<Budget>,
+    /// Write all runs to this file as JSON; - writes them to stdout, and the table to stderr
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Folder for the plot NAME.svg, the graph NAME.tuned.jsonc and the runs NAME.study.json; created if missing
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+    /// Override a param (node.param=VALUE) or a control (name=VALUE) in all runs; repeatable
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Setting>,
+    /// Cook each setting this many times, one after the other in rounds, and take the least time [default: 3, fewer where a run takes seconds]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    repeats: Option<u32>,
+    /// Do not use the runs that NAME.study.json has
+    #[arg(long)]
+    fresh: bool,
+    /// Number of threads [default: the machine's]
+    #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = clap::value_parser!(u16).range(0..=1024))]
+    threads: u16,
+    /// Memory for the results that a frame needs, such as 8G [default: half of the machine's]
+    #[arg(long, value_name = "SIZE")]
+    memory: Option<Size>,
+    /// Print only errors and the table
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| number.is_finite() && *number > 0.0);
+    number.ok_or_else(|| format!("`{text}` is not a tolerance, expected a number greater than 0"))
+}
+
+/// `20ms`, `1.5s` of `--budget`, in milliseconds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Budget(f64);
+
+impl FromStr for Budget {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let plain = text.trim();
+        let (number, unit) = match (plain.strip_suffix("ms"), plain.strip_suffix('s')) {
+            (Some(number), _) => (number, 1.0),
+            (None, Some(number)) => (number, 1e3),
+            (None, None) => (plain, 1.0),
+        };
+        let number = number.trim().parse::<f64>().ok().filter(|number| number.is_finite() && *number > 0.0);
+        number.map(|number| Self(number * unit)).ok_or_else(|| format!("`{text}` is not a time; write 20ms or 1.5s"))
+    }
+}
+
+/// Measures, and writes what was found.
+///
+/// # Errors
+/// If the graph has faults, a file cannot be written, the norm does not fit, nothing satisfies the tolerance or budget, or
+/// the study is interrupted.
+pub fn run(args: &StudyArgs) -> Result<(), Failure> {
+    let wrong = |line: String| Failure::new(Exit::CommandLine, line);
+    let bytes = load::bytes(&args.graph)?;
+    let loaded = load::loaded(&bytes, &args.graph, &args.set);
+    let graph = loaded.map_err(|faults| load::faulty(&args.graph, &faults))?;
+    let output = output(&graph, args.output.as_deref())?;
+    let name = graph.outputs[output].name.to_string();
+    if args.knobs.is_empty() {
+        let text = propose::text(&graph, output, &load::graph_name(&args.graph));
+        std::io::stdout().write_all(text.as_bytes())?;
+        return Ok(());
+    }
+    let norm = Norm::of(&args.norm).map_err(wrong)?;
+    let unit = norm.measure.unit(&graph).map_err(wrong)?;
+    let request = Request { outputs: vec![output], frames: Frames::of_scene(args.frames.as_ref(), &graph.scene)? };
+    let knobs: Vec<Knob> = args.knobs.iter().map(|knob| Knob::new(knob, &graph)).collect();
+    if let Some(twice) = (1..knobs.len()).find(|index| knobs[..*index].iter().any(|knob| knob.key == knobs[*index].key))
+    {
+        return Err(wrong(format!(
+            "the knob `{}` is given twice; write all its values in one --knob",
+            knobs[twice].key
+        )));
+    }
+    let paths = Paths::new(args, &name);
+    paths.check(args, &graph)?;
+    let mut fixed: Vec<(String, String)> =
+        args.set.iter().map(|Setting(key, value)| (key.clone(), value.clone())).collect();
+    let needs = measure::needs(&knobs, &graph);
+    if !args.quiet {
+        needs.iter().for_each(|(key, value, knob)| {
+            crate::say!("note: `{knob}` is read only with {key}={value}, which all runs use");
+        });
+    }
+    fixed.extend(needs.into_iter().map(|(key, value, _)| (key, value)));
+    let cancel = cancelled_by_signal();
+    let planned = measure::planned_runs(&knobs, args.repeats.unwrap_or(measure::REPEATS));
+    let progress = Progress::new((planned * request.frames.len()) as u64, args.quiet);
+    let frames = request.frames.iter().map(Frame::to_json).collect();
+    let subject = Subject {
+        bytes: &bytes,
+        path: &args.graph,
+        fixed,
+        request,
+        norm: norm.clone(),
+        threads: usize::from(args.threads),
+        ceiling: memory::ceiling(args.memory),
+        cancel,
+        progress,
+    };
+    let goal = match (args.tolerance, args.budget) {
+        (Some(tolerance), _) => Goal::Tolerance(tolerance),
+        (None, Some(Budget(ms))) => Goal::Budget(ms),
+        (None, None) => Goal::None,
+    };
+    create_folder(&args.out)?;
+    let mut study = Study::new(&subject, knobs, goal, &graph, &paths.store, args.repeats);
+    if !args.fresh && study.resume() && !args.quiet {
+        crate::say!("{} runs are taken from `{}`; --fresh measures them anew", study.runs(), paths.store.display());
+    }
+    let interrupted = study.measure()?;
+    let found = study.finish()?;
+    // Ends the bar, before anything else is printed.
+    let Subject { progress, fixed, .. } = subject;
+    drop(progress);
+    let mut outcome = Outcome {
+        graph: load::graph_name(&args.graph),
+        output: name,
+        norm,
+        unit,
+        frames,
+        knobs: found.knobs,
+        reference: found.stored.reference,
+        why: found.stored.why,
+        floor: found.stored.floor,
+        is_beyond: found.stored.is_beyond,
+        rounding: found.stored.rounding,
+        runs: found.stored.runs,
+        front: Vec::new(),
+        pick: None,
+        goal,
+    };
+    outcome.judge();
+    write(args, &paths, &outcome, &bytes, &graph, &fixed)?;
+    if interrupted {
+        return Err(Failure::new(
+            Exit::Interrupted,
+            format!("interrupted; {} runs are kept, the same command goes on", outcome.runs.len()),
+        ));
+    }
+    verdict(&outcome)
+}
+
+/// The index of the output with that name, or of the only one.
+fn output(graph: &Graph, name: Option<&str>) -> Result<usize, Failure> {
+    match name {
+        Some(name) => Ok(load::outputs(graph, &[name.to_owned()])?[0]),
+        None if graph.outputs.len() == 1 => Ok(0),
+        None => {
+            let names: Vec<String> = graph.outputs.iter().map(|output| format!("`{}`", output.name)).collect();
+            let line = format!("the graph has several outputs; write --output with one of {}", names.join(", "));
+            Err(Failure::new(Exit::CommandLine, line))
+        }
+    }
+}
+
+/// The files of a study.
+struct Paths {
+    plot: PathBuf,
+    tuned: PathBuf,
+    store: PathBuf,
+}
+
+impl Paths {
+    fn new(args: &StudyArgs, name: &str) -> Self {
+        let file = |ending: &str| args.out.join(format!("{name}.{ending}"));
+        Self { plot: file("svg"), tuned: file("tuned.jsonc"), store: store::path(&args.out, name) }
+    }
+
+    /// Refuses to overwrite what is read.
+    fn check(&self, args: &StudyArgs, graph: &Graph) -> Result<(), Failure> {
+        let mut targets = Targets::default();
+        if !load::is_stdin(&args.graph) {
+            targets.reads(&args.graph, "it is the graph");
+        }
+        graph.files().into_iter().for_each(|path| targets.reads(path, "the graph reads it"));
+        [&self.plot, &self.tuned, &self.store].into_iter().for_each(|path| targets.writes("--out", Exit::File, path));
+        if let Some(path) = args.json.as_ref().filter(|path| !is_stdout(path)) {
+            targets.writes("--json", Exit::CommandLine, path);
+        }
+        targets.check()?;
+        targets.sweep();
+        Ok(())
+    }
+}
+
+fn is_stdout(path: &Path) -> bool {
+    path == Path::new("-")
+}
+
+/// Writes plot, tuned graph, JSON and table.
+fn write(
+    args: &StudyArgs,
+    paths: &Paths,
+    outcome: &Outcome,
+    bytes: &[u8],
+    graph: &Graph,
+    fixed: &[(String, String)],
+) -> Result<(), Failure> {
+    write_whole(&paths.plot, plot::svg(outcome).as_bytes())?;
+    let mut wrote = vec![&paths.plot];
+    if let Some(pick) = outcome.pick {
+        let tuned = tune::tuned(outcome, pick, bytes, graph, fixed, &args.out);
+        let tuned = tuned.map_err(|why| Failure::new(Exit::Graph, why))?;
+        write_whole(&paths.tuned, tuned.as_bytes())?;
+        wrote.push(&paths.tuned);
+    }
+    let table = table::text(outcome);
+    if let Some(path) = &args.json {
+        let text = format!("{:#}\n", outcome.to_json());
+        if is_stdout(path) {
+            std::io::stdout().write_all(text.as_bytes())?;
+        } else {
+            write_whole(path, text.as_bytes())?;
+            wrote.push(path);
+        }
+    }
+    match args.json.as_ref().is_some_and(|path| is_stdout(path)) {
+        true => crate::say!("{}", table.trim_end()),
+        false => std::io::stdout().write_all(table.as_bytes())?,
+    }
+    if !args.quiet {
+        wrote.into_iter().for_each(|path| crate::say!("wrote {}", path.display()));
+    }
+    Ok(())
+}
+
+/// Whether what was asked for was found.
+fn verdict(outcome: &Outcome) -> Result<(), Failure> {
+    let failed = |line: String| Err(Failure::new(Exit::Cook, line));
+    let Some(best) = outcome.most_accurate() else {
+        let why = outcome.runs.iter().find_map(|run| run.result.as_ref().err());
+        return failed(format!("no setting could be cooked: {}", why.map_or("nothing was run", |why| why)));
+    };
+    if outcome.pick.is_some() {
+        return Ok(());
+    }
+    let statistic = outcome.norm.statistic.name();
+    let unit = if outcome.unit.is_empty() { String::new() } else { format!(" {}", outcome.unit) };
+    let brief = table::brief;
+    match outcome.goal {
+        Goal::None => Ok(()),
+        Goal::Tolerance(tolerance) if outcome.floor.is_some() && tolerance < outcome.floor() => failed(format!(
+            "the tolerance {}{unit} is below the floor of the {statistic}, {}{unit}: such an error cannot be claimed; give \
+             the knobs finer values",
+            brief(tolerance),
+            brief(outcome.floor())
+        )),
+        Goal::Tolerance(tolerance) => failed(format!(
+            "no setting has a {statistic} of at most {}{unit}; the best is run {best} with {}{unit}",
+            brief(tolerance),
+            table::shown_error(outcome, outcome.error(best).unwrap_or_default())
+        )),
+        Goal::Budget(ms) => {
+            let fastest = outcome.front.first().copied().unwrap_or(best);
+            failed(format!(
+                "no setting takes at most {} ms a frame; the fastest is run {fastest} with {} ms",
+                brief(ms),
+                brief(outcome.ms(fastest).unwrap_or_default())
+            ))
+        }
+    }
+}

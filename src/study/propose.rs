@@ -1,0 +1,94 @@
+//! Knobs worth a study: what the nodes that an output depends on declare, as commands ready to run.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+use engine::graph::{Body, Graph, GraphNode};
+use engine::node::{Accuracy, Trials};
+use engine::param::{Source, Value};
+
+use crate::numbers::short;
+
+/// A command for each knob.
+pub(super) fn text(graph: &Graph, output: usize, graph_name: &str) -> String {
+    let needed = upstream(graph, graph.outputs[output].from.node);
+    let name = &graph.outputs[output].name;
+    let mut text = String::new();
+    for node in needed.iter().map(|node| &graph.nodes[*node]) {
+        for accuracy in node.node().map_or(&[][..], |declared| declared.accuracy) {
+            let key = format!("{}.{}", node.id, accuracy.param);
+            let order = accuracy.order.map(|order| format!(", order {}", short(order))).unwrap_or_default();
+            let _ = match values(node, accuracy) {
+                Some(values) => writeln!(text, "# {} of {}{order}", accuracy.param, node.type_name()).and_then(|()| {
+                    writeln!(text, "convect study {graph_name} --knob {key}={} --output {name}", values.join(","))
+                }),
+                None => writeln!(
+                    text,
+                    "# {} of {}{order}: its value is animated or chosen by the node; set one, and try it with its half and double",
+                    key,
+                    node.type_name()
+                ),
+            };
+        }
+    }
+    match text.is_empty() {
+        true => format!(
+            "no node of the output `{name}` declares a param that trades accuracy for time; any param can be a knob: \
+             --knob node.param=VALUE,VALUE,…\n"
+        ),
+        false => text,
+    }
+}
+
+/// The nodes that a node depends on, and itself.
+fn upstream(graph: &Graph, node: usize) -> BTreeSet<usize> {
+    let mut needed = BTreeSet::from([node]);
+    // Each node comes after those it reads.
+    for index in (0..=node).rev() {
+        if needed.contains(&index) {
+            needed.extend(graph.nodes[index].inputs().iter().flatten().map(|link| link.node));
+        }
+    }
+    needed
+}
+
+/// The values to compare, as `--knob` takes them.
+fn values(node: &GraphNode, accuracy: &Accuracy) -> Option<Vec<String>> {
+    match accuracy.trials {
+        Trials::These(values) => Some(values.iter().map(|value| (*value).to_owned()).collect()),
+        Trials::Times(factors) => {
+            let Body::Node { specs, params, .. } = &node.body else { return None };
+            let place = specs.iter().position(|spec| spec.name == accuracy.param)?;
+            let Source::Constant(Value::Float(current)) = &params[place] else { return None };
+            (*current > 0.0).then(|| factors.iter().map(|factor| short(current * factor)).collect())
+        }
+    }
+}
+
+/// Whether every declaration of a node names its params, with values that `--knob` takes; for tests.
+#[cfg(test)]
+fn check(node: &engine::node::Node) {
+    let specs = node.param_specs();
+    let has = |name: &str| specs.iter().any(|spec| spec.name == name);
+    for accuracy in node.accuracy {
+        assert!(has(accuracy.param), "{} declares an accuracy of `{}`", node.name, accuracy.param);
+        for (other, word) in accuracy.exact.iter().chain(&accuracy.needs) {
+            let spec = specs.iter().find(|spec| spec.name == *other).expect("the param exists");
+            let engine::param::Shape::Choice(options) = spec.shape else { panic!("{other} is no choice") };
+            assert!(options.iter().any(|option| option.word == *word), "{other} has no `{word}`");
+        }
+        if let Trials::These(values) = accuracy.trials {
+            let knob = format!("node.{}={}", accuracy.param, values.join(","));
+            assert!(knob.parse::<super::knobs::KnobArg>().is_ok(), "{knob}");
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn every_declared_accuracy_names_a_param_and_values_of_it() {
+        crate::CATALOGUE.nodes().for_each(super::check);
+        assert!(crate::CATALOGUE.nodes().filter(|node| !node.accuracy.is_empty()).count() >= 4);
+    }
+}

@@ -1,0 +1,277 @@
+//! `study`: errors with known orders and values, the contract of its JSON, tuned graphs, failures, interruptions.
+
+use serde_json::{Value, json};
+
+use super::bench::Bench;
+
+/// Upright hairs of one segment that the wind turns into a wall: each stops at its first contact, so what steps get wrong is
+/// a part of one step.
+const WALL: &str = r#"// A wall in the wind.
+{
+  "convect": 1,
+  "scene": { "frames": [1, 2] },
+  "nodes": {
+    "ground": { "type": "Mesh_Primitive", "params": { "shape": "grid", "size": [0.4, 0, 0.4], "divisions": 1 } },
+    "blades": { "type": "Curve_Scatter", "inputs": { "skin": "ground" }, "params": { "density": 2000, "cvs": 2, "lean": 0, "length": [0.2, 0.3] } },
+    "wind": { "type": "Curve_Wind", "inputs": { "curves": "blades" }, "params": { "wind_dir": [1, 0, 0], "global_rotate": { "expr": "0.8 + 0.02*frame" }, "noise": "none" } },
+    "wall": { "type": "Mesh_Primitive", "params": { "shape": "box", "size": [0.1, 1, 1] } },
+    "put": { "type": "Transform", "inputs": { "geometry": "wall" }, "params": { "translate": [0.3, 0, 0] } },
+    // Turned in steps.
+    "bent": {
+      "type": "Curve_Wind_Collision", "inputs": { "curves": "wind", "rest": "blades", "colliders": ["ground", "put"] },
+      "params": { "rotation_steps": 3 /* few */, "offset_root": 0.001 },
+    },
+  },
+  "outputs": { "grass": "bent" },
+}
+"#;
+
+/// Hairs that swing in a wind of two frequencies.
+const SWING: &str = r#"{
+  "convect": 1,
+  "scene": { "frames": [1, 100] },
+  "nodes": {
+    "ball": { "type": "Mesh_Primitive", "params": { "shape": "sphere", "size": [0.2, 0.2, 0.2], "divisions": 6 } },
+    "fur": { "type": "Curve_Scatter", "inputs": { "skin": "ball" }, "params": { "density": 500, "cvs": 4 } },
+    "wind": { "type": "Curve_Wind", "inputs": { "curves": "fur" }, "params": { "wind_dir": [-1, 0.2, 0], "noise": "none",
+              "global_rotate": { "expr": "0.4 + 0.3*sin(7*time) + 0.2*sin(17*time)" } } },
+    "jiggle": { "type": "Curve_Jiggle", "inputs": { "curves": "wind" }, "params": { "frequency": 6, "damping": 0.15 } }
+  },
+  "outputs": { "fur": "jiggle" }
+}"#;
+
+const STEPS: &str = "bent.rotation_steps=4,8,16,32";
+
+fn study(bench: &Bench, more: &[&str]) -> Value {
+    let args = ["study", "g.json", "--json", "-", "--quiet", "--repeats", "1", "--fresh"];
+    bench.json(&[&args[..], more].concat())
+}
+
+/// The measured order in the table.
+fn order(table: &str) -> f64 {
+    let line = table.lines().find(|line| line.starts_with("order of ")).unwrap_or_else(|| panic!("{table}"));
+    line.split_once(": ").unwrap().1.split_whitespace().next().unwrap().parse().unwrap()
+}
+
+fn keys(value: &Value) -> Vec<&str> {
+    let mut keys: Vec<&str> = value.as_object().unwrap().keys().map(String::as_str).collect();
+    keys.sort_unstable();
+    keys
+}
+
+#[test]
+fn the_json_has_the_documented_keys_and_the_table_goes_to_stderr() {
+    let bench = Bench::with_graph(WALL);
+    let ran = bench.run(&["study", "g.json", "--knob", STEPS, "--output", "grass", "--json", "-", "--repeats", "1"]);
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    assert!(ran.stderr.contains("floor: mean ") && ran.stderr.contains("declared 1"), "{}", ran.stderr);
+    let found: Value = serde_json::from_str(&ran.stdout).unwrap();
+    let expected =
+        ["floor", "frames", "front", "graph", "knobs", "norm", "output", "pick", "reference", "runs", "study", "unit"];
+    assert_eq!(keys(&found), expected);
+    assert_eq!((&found["study"], &found["norm"], &found["unit"]), (&json!(1), &json!("points"), &json!("m")));
+    assert_eq!((&found["frames"], &found["knobs"]), (&json!([1, 2]), &json!(["bent.rotation_steps"])));
+    assert_eq!(found["reference"]["settings"]["bent.method"], json!("exact"));
+    assert_eq!((keys(&found["floor"]), &found["pick"]), (vec!["max", "mean", "p99"], &Value::Null));
+    let runs = found["runs"].as_array().unwrap();
+    let expected = ["cpu_ms", "error", "failed", "ms", "nodes", "peak_bytes", "settings"];
+    assert!(runs.len() == 4 && runs.iter().all(|run| keys(run) == expected), "{runs:?}");
+    assert_eq!(runs[3]["settings"], json!({"bent.rotation_steps": 32}));
+    assert!(runs.iter().all(|run| run["ms"].as_f64().unwrap() > 0.0 && run["nodes"]["bent"].as_f64().unwrap() > 0.0));
+    assert_eq!(runs[0]["nodes"]["ground"], json!(0.0), "a still source is read before the cook");
+    let svg = String::from_utf8(bench.files("out").remove("grass.svg").unwrap()).unwrap();
+    assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>\n") && svg.contains("time per frame (ms)"), "{svg}");
+    assert_eq!(bench.names("out"), ["grass.study.json", "grass.svg"]);
+}
+
+#[test]
+fn errors_are_those_of_separate_cooks() {
+    let bench = Bench::with_graph(WALL);
+    let found = study(&bench, &["--knob", "bent.rotation_steps=4,8"]);
+    let points = |set: &str| -> Vec<f64> {
+        bench.done(&["cook", "g.json", "--set", set, "--set", "bent.rotation_steps=4", "--format", "json", "--quiet"]);
+        let frames = ["grass.0001.json", "grass.0002.json"].map(|name| bench.files("out").remove(name).unwrap());
+        let rows = frames.iter().flat_map(|bytes| {
+            let frame: Value = serde_json::from_slice(bytes).unwrap();
+            frame["curves"]["points"].as_array().unwrap().clone()
+        });
+        rows.flat_map(|row| row.as_array().unwrap().clone()).map(|x| f64::from(x.as_f64().unwrap() as f32)).collect()
+    };
+    let (a, b) = (points("bent.method=steps"), points("bent.method=exact"));
+    let distance = |(a, b): (&[f64], &[f64])| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt();
+    let distances: Vec<f64> = a.chunks(3).zip(b.chunks(3)).map(distance).collect();
+    let mean = distances.iter().sum::<f64>() / distances.len() as f64;
+    let stated = found["runs"][0]["error"]["mean"].as_f64().unwrap();
+    assert!((stated - mean).abs() <= 1e-6 * mean && mean > 1e-3, "{stated} {mean}");
+}
+
+#[test]
+fn measured_orders_are_those_declared() {
+    let table = Bench::with_graph(WALL).done(&["study", "g.json", "--knob", STEPS, "--repeats", "1", "--quiet"]);
+    assert!((order(&table) - 1.0).abs() < 0.2, "{table}");
+    let tolerance = "jiggle.tolerance=1e-1,3e-2,1e-2,3e-3,1e-3";
+    let args = ["study", "g.json", "--knob", tolerance, "--repeats", "1", "--quiet", "--frames", "80-100"];
+    let table = Bench::with_graph(SWING).done(&args);
+    assert!((order(&table) - 1.0).abs() < 0.2, "{table}");
+}
+
+#[test]
+fn one_level_finer_moves_no_error_by_more_than_the_floor() {
+    let bench = Bench::with_graph(SWING);
+    let means = |values: &str| -> (Vec<f64>, f64) {
+        let knob = format!("jiggle.tolerance={values}");
+        let found = study(&bench, &["--knob", &knob, "--frames", "90-100"]);
+        let mean = |run: &Value| run["error"]["mean"].as_f64().unwrap();
+        (found["runs"].as_array().unwrap().iter().map(mean).collect(), found["floor"]["mean"].as_f64().unwrap())
+    };
+    let ((coarse, floor), (fine, _)) = (means("1e-1,3e-2,1e-2"), means("1e-1,3e-2,1e-2,3.3333333333e-3"));
+    assert!(floor > 0.0 && coarse[2] == floor, "the best's error is the floor");
+    assert!(coarse.iter().zip(&fine).all(|(a, b)| (a - b).abs() <= floor), "{coarse:?} {fine:?}");
+}
+
+#[test]
+fn values_that_are_refused_stay_as_failures() {
+    let bench = Bench::with_graph(WALL);
+    let found = study(&bench, &["--knob", "bent.rotation_steps=-1,4,8"]);
+    let failed = &found["runs"][0];
+    assert_eq!(
+        (&failed["error"], &failed["ms"], &failed["settings"]),
+        (&Value::Null, &Value::Null, &json!({"bent.rotation_steps": -1}))
+    );
+    assert!(failed["failed"].as_str().unwrap().contains("`rotation_steps` is -1; expected"), "{failed}");
+    assert!(!found["front"].as_array().unwrap().contains(&json!(0)));
+    let svg = String::from_utf8(bench.files("out").remove("grass.svg").unwrap()).unwrap();
+    assert!(svg.contains("failed: 1"), "{svg}");
+    // A setting beyond which nothing is: the finest that can be cooked is the reference, and the floor is unknown.
+    let words = study(&bench, &["--knob", "bent.method=steps,exact"]);
+    assert_eq!((&words["floor"]["mean"], &words["runs"][1]["error"]["max"]), (&Value::Null, &json!(0.0)));
+}
+
+#[test]
+fn a_tuned_graph_keeps_comments_loads_and_errs_by_what_was_said() {
+    let bench = Bench::with_graph(&WALL.replace(
+        "\"type\": \"Mesh_Primitive\", \"params\": { \"shape\": \"box\", \"size\": [0.1, 1, 1] }",
+        "\"type\": \"Mesh_In\", \"params\": { \"file\": \"wall.obj\" }",
+    ));
+    bench.write("wall.obj", "v 0 -1 -1\nv 0 1 -1\nv 0 1 1\nv 0 -1 1\nf 1 2 3 4\n");
+    let found = study(&bench, &["--knob", STEPS, "--tolerance", "4e-3"]);
+    let pick = &found["runs"][found["pick"].as_u64().unwrap() as usize];
+    let error = pick["error"]["mean"].as_f64().unwrap();
+    assert!(error <= 4e-3, "{found}");
+    let tuned = String::from_utf8(bench.files("out").remove("grass.tuned.jsonc").unwrap()).unwrap();
+    let kept = [
+        "// A wall in the wind.",
+        "// Turned in steps.",
+        "/* few */",
+        "/* convect study: cheapest within 0.004 m: mean points error ",
+    ];
+    assert!(kept.iter().all(|part| tuned.contains(part)), "{tuned}");
+    assert!(tuned.contains("\"method\": \"steps\"") && tuned.contains("\"file\": \"../wall.obj\""), "{tuned}");
+    bench.done(&["check", "out/grass.tuned.jsonc"]);
+    // The tuned setting alone, against the same reference.
+    let steps = pick["settings"]["bent.rotation_steps"].to_string();
+    let knob = format!("bent.rotation_steps={steps}");
+    let again = bench.json(&["study", "out/grass.tuned.jsonc", "--knob", &knob, "--json", "-", "-q", "--out", "again"]);
+    assert_eq!(again["runs"][0]["error"], pick["error"]);
+}
+
+#[test]
+fn a_tolerance_below_the_floor_or_out_of_reach_is_not_claimed() {
+    let bench = Bench::with_graph(WALL);
+    let ran = bench.run(&["study", "g.json", "--knob", STEPS, "--tolerance", "1e-9", "--repeats", "1"]);
+    assert_eq!(ran.code, Some(4));
+    assert!(
+        ran.stderr.contains("the tolerance 1e-9 m is below the floor") && ran.stderr.contains("cannot be claimed"),
+        "{}",
+        ran.stderr
+    );
+    let ran = bench.run(&["study", "g.json", "--knob", STEPS, "--tolerance", "1e-5", "--repeats", "1"]);
+    assert_eq!(ran.code, Some(4));
+    assert!(ran.stderr.contains("no setting has a mean of at most 1e-5 m; the best is run 3"), "{}", ran.stderr);
+    assert!(!bench.path("out/grass.tuned.jsonc").exists());
+    let found = study(&bench, &["--knob", STEPS, "--budget", "60s"]);
+    assert_eq!(found["pick"], json!(3), "within a budget that all meet the most accurate is picked");
+}
+
+#[test]
+fn wrong_names_are_refused_with_what_was_meant() {
+    let bench = Bench::with_graph(WALL);
+    let refused = |code: i32, args: &[&str], text: &str| {
+        let ran = bench.run(&[&["study", "g.json"], args].concat());
+        assert_eq!(ran.code, Some(code), "{}", ran.stderr);
+        assert!(ran.stderr.contains(text), "{}", ran.stderr);
+        assert!(!bench.path("out").join("grass.svg").exists());
+    };
+    refused(3, &["--knob", "bnt.rotation_steps=1,2"], "there is no node `bnt`; did you mean `bent`?");
+    refused(3, &["--knob", "bent.rotatoin_steps=1,2"], "did you mean `rotation_steps`?");
+    refused(2, &["--knob", "bent=1,2"], "`bent=1,2` is not a knob; write node.param=VALUE");
+    refused(2, &["--knob", STEPS, "--output", "fur"], "the graph has no output `fur`");
+    refused(2, &["--knob", STEPS, "--norm", "bent.nothing"], "has no metric `nothing`; it has `");
+    refused(2, &["--knob", STEPS, "--norm", "heat"], "the output has no attribute `heat`");
+    refused(2, &["--knob", "blades.cvs=2,4"], "use --norm surface");
+}
+
+#[test]
+fn norms_of_surfaces_attributes_and_metrics_have_their_units() {
+    let bench = Bench::with_graph(WALL);
+    let surface = study(&bench, &["--knob", "blades.cvs=2,3", "--norm", "surface,max", "--tolerance", "9"]);
+    assert_eq!(
+        (&surface["norm"], &surface["unit"], surface["pick"].is_number()),
+        (&json!("surface"), &json!("m"), true)
+    );
+    let metric = study(&bench, &["--knob", STEPS, "--norm", "bent.length_error"]);
+    assert_eq!((&metric["norm"], &metric["unit"]), (&json!("bent.length_error"), &json!("")));
+    let attribute = study(&bench, &["--knob", STEPS, "--norm", "P"]);
+    assert_eq!(attribute["runs"][0]["error"], study(&bench, &["--knob", STEPS])["runs"][0]["error"]);
+}
+
+#[test]
+fn errors_do_not_depend_on_the_number_of_threads() {
+    let bench = Bench::with_graph(WALL);
+    let errors = |threads: &str| -> Vec<Value> {
+        let found = study(&bench, &["--knob", STEPS, "--norm", "surface", "--threads", threads]);
+        found["runs"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|run| run["error"].clone())
+            .chain([found["floor"].clone()])
+            .collect()
+    };
+    assert_eq!(errors("1"), errors("3"));
+}
+
+#[test]
+fn several_knobs_make_a_grid_and_a_large_one_is_searched() {
+    let bench = Bench::with_graph(WALL);
+    let grid = study(&bench, &["--knob", "bent.rotation_steps=4,8", "--knob", "blades.length=[0.2,0.3],[0.2,0.25]"]);
+    assert_eq!(grid["runs"].as_array().unwrap().len(), 4);
+    assert_eq!(grid["runs"][1]["settings"], json!({"bent.rotation_steps": 4, "blades.length": [0.2, 0.25]}));
+    let steps = (1..=13).map(|k| k.to_string()).collect::<Vec<_>>().join(",");
+    let (a, b) = (format!("bent.rotation_steps={steps}"), "bent.gap=5e-4,4e-4,3e-4,2e-4,1e-4");
+    let searched = study(&bench, &["--knob", &a, "--knob", b, "--frames", "1", "--tolerance", "1"]);
+    let runs = searched["runs"].as_array().unwrap().len();
+    assert!((17..64).contains(&runs) && searched["pick"].is_number(), "{runs} runs");
+}
+
+#[test]
+fn finished_runs_are_kept_for_the_same_command_only() {
+    let bench = Bench::with_graph(WALL);
+    let run = |knob: &str| bench.run(&["study", "g.json", "--knob", knob, "--repeats", "1"]);
+    let (first, again) = (run(STEPS), run(STEPS));
+    assert!(again.stderr.contains("4 runs are taken from `out/grass.study.json`"), "{}", again.stderr);
+    assert_eq!(first.stdout, again.stdout, "times too");
+    assert!(!run("bent.rotation_steps=4,8").stderr.contains("are taken from"));
+    bench.write("g.json", &WALL.replace("2000", "1500"));
+    assert!(!run("bent.rotation_steps=4,8").stderr.contains("are taken from"));
+}
+
+#[test]
+fn without_knobs_commands_for_those_of_the_graph_are_printed() {
+    let bench = Bench::with_graph(WALL);
+    let text = bench.done(&["study", "g.json"]);
+    let command = text.lines().find(|line| line.contains("bent.rotation_steps=")).unwrap();
+    assert!(text.contains("# rotation_steps of Curve_Wind_Collision, order 1\n"), "{text}");
+    let args: Vec<&str> = command.split(' ').skip(1).chain(["--frames", "1", "--repeats", "1", "--quiet"]).collect();
+    assert!(bench.done(&args).contains("declared 1"));
+}
