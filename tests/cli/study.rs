@@ -40,6 +40,21 @@ const SWING: &str = r#"{
   "outputs": { "fur": "jiggle" }
 }"#;
 
+/// A soft block that sways gently from a pinned side: smooth motion, without contact.
+const SWAY: &str = r#"{
+  "convect": 1,
+  "scene": { "frames": [1, 12] },
+  "nodes": {
+    "block": { "type": "Mesh_Primitive", "params": { "shape": "box", "size": [0.2, 0.2, 0.2], "divisions": 2 } },
+    "body": { "type": "Tetrahedralize", "inputs": { "surface": "block" } },
+    "wall": { "type": "Point_In", "params": { "points": [[-0.1, 0, 0]] } },
+    "pin": { "type": "Softbody_Pin", "inputs": { "targets": "wall" }, "params": { "radius": 0.12 } },
+    "soft": { "type": "Softbody", "inputs": { "bodies": "body", "pins": "pin" },
+              "params": { "stiffness": 20000, "damping": 0, "volume": 0, "gravity": [0, -0.5, 0] } }
+  },
+  "outputs": { "soft": "soft" }
+}"#;
+
 const STEPS: &str = "bent.rotation_steps=4,8,16,32";
 
 fn study(bench: &Bench, more: &[&str]) -> Value {
@@ -116,6 +131,16 @@ fn measured_orders_are_those_declared() {
 }
 
 #[test]
+fn a_method_of_lower_order_than_declared_is_caught() {
+    let bench = Bench::with_graph(SWAY);
+    let args = ["study", "g.json", "--knob", "soft.substeps=2,4,8,16", "--repeats", "1", "--quiet", "--fresh"];
+    let table = bench.done(&args);
+    assert!((order(&table) - 2.0).abs() < 0.2 && !table.contains("lower than declared"), "{table}");
+    let euler = bench.done(&[&args[..], &["--set", "soft.integrator=euler", "--set", "soft.damping=0.02"]].concat());
+    assert!(order(&euler) < 1.2 && euler.contains("declared 2: lower than declared"), "{euler}");
+}
+
+#[test]
 fn one_level_finer_moves_no_error_by_more_than_the_floor() {
     let bench = Bench::with_graph(SWING);
     let means = |values: &str| -> (Vec<f64>, f64) {
@@ -142,6 +167,10 @@ fn values_that_are_refused_stay_as_failures() {
     assert!(!found["front"].as_array().unwrap().contains(&json!(0)));
     let svg = String::from_utf8(bench.files("out").remove("grass.svg").unwrap()).unwrap();
     assert!(svg.contains("failed: 1"), "{svg}");
+    let none = bench.run(&["study", "g.json", "--knob", "bent.gap=-1,-2", "--json", "-", "--quiet"]);
+    let failed: Value = serde_json::from_str(&none.stdout).unwrap();
+    assert_eq!((none.code, failed["runs"].as_array().unwrap().len()), (Some(4), 2));
+    assert!(none.stderr.contains("no setting could be cooked"), "{}", none.stderr);
     // A setting beyond which nothing is: the finest that can be cooked is the reference, and the floor is unknown.
     let words = study(&bench, &["--knob", "bent.method=steps,exact"]);
     assert_eq!((&words["floor"]["mean"], &words["runs"][1]["error"]["max"]), (&Value::Null, &json!(0.0)));
