@@ -55,7 +55,7 @@ fn changes_topology(graph: &Graph, node: usize, needed: &BTreeSet<usize>) -> boo
 }
 
 /// The nodes that a node depends on, and itself.
-fn upstream(graph: &Graph, node: usize) -> BTreeSet<usize> {
+pub(super) fn upstream(graph: &Graph, node: usize) -> BTreeSet<usize> {
     let mut needed = BTreeSet::from([node]);
     // Each node comes after those it reads.
     for index in (0..=node).rev() {

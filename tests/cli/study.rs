@@ -3,6 +3,10 @@
 use serde_json::{Value, json};
 
 use super::bench::Bench;
+#[cfg(unix)]
+use super::{bench::Ran, stopped::signal, stopped::wait_for};
+#[cfg(unix)]
+use std::process::Stdio;
 
 /// Upright hairs of one segment that the wind turns into a wall: each stops at its first contact, so what steps get wrong is
 /// a part of one step.
@@ -224,9 +228,10 @@ fn a_tolerance_below_the_floor_or_out_of_reach_is_not_claimed() {
 
 #[test]
 fn wrong_names_are_refused_with_what_was_meant() {
-    let bench = Bench::with_graph(WALL);
+    let bench = Bench::with_graph(&WALL.replace("\"grass\": \"bent\"", "\"grass\": \"bent\", \"still\": \"put\""));
     let refused = |code: i32, args: &[&str], text: &str| {
-        let ran = bench.run(&[&["study", "g.json"], args].concat());
+        let output = if args.contains(&"--output") { &[][..] } else { &["--output", "grass"] };
+        let ran = bench.run(&[&["study", "g.json"], args, output].concat());
         assert_eq!(ran.code, Some(code), "{}", ran.stderr);
         assert!(ran.stderr.contains(text), "{}", ran.stderr);
         assert!(!bench.path("out").join("grass.svg").exists());
@@ -234,6 +239,7 @@ fn wrong_names_are_refused_with_what_was_meant() {
     refused(3, &["--knob", "bnt.rotation_steps=1,2"], "there is no node `bnt`; did you mean `bent`?");
     refused(3, &["--knob", "bent.rotatoin_steps=1,2"], "did you mean `rotation_steps`?");
     refused(2, &["--knob", "bent=1,2"], "`bent=1,2` is not a knob; write node.param=VALUE");
+    refused(2, &["--knob", "blades.cvs=2,4", "--output", "still"], "the output `still` does not depend on `blades`");
     refused(2, &["--knob", STEPS, "--output", "fur"], "the graph has no output `fur`");
     refused(2, &["--knob", STEPS, "--norm", "bent.nothing"], "has no metric `nothing`; it has `");
     refused(2, &["--knob", STEPS, "--norm", "heat"], "the output has no attribute `heat`");
@@ -293,6 +299,23 @@ fn finished_runs_are_kept_for_the_same_command_only() {
     assert!(!run("bent.rotation_steps=4,8").stderr.contains("are taken from"));
     bench.write("g.json", &WALL.replace("2000", "1500"));
     assert!(!run("bent.rotation_steps=4,8").stderr.contains("are taken from"));
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_writes_what_was_measured_and_the_same_command_goes_on() {
+    let bench = Bench::with_graph(WALL);
+    let args = ["study", "g.json", "--knob", STEPS, "--json", "runs.json", "--repeats", "1000"];
+    let child = bench.command(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    wait_for(1, &bench.path("out"));
+    signal("INT", &child);
+    let ran = Ran::of(&child.wait_with_output().unwrap());
+    assert_eq!(ran.code, Some(130), "{}", ran.stderr);
+    assert!(ran.stderr.contains("interrupted; 4 runs are kept") && ran.stdout.contains("floor: "), "{}", ran.stderr);
+    assert_eq!(bench.read_json("runs.json")["runs"].as_array().unwrap().len(), 4);
+    assert_eq!(bench.names("out"), ["grass.study.json", "grass.svg"], "and no temporaries");
+    let ran = bench.run(&["study", "g.json", "--knob", STEPS, "--repeats", "1"]);
+    assert!(ran.stderr.contains("4 runs are taken from"), "{}", ran.stderr);
 }
 
 #[test]
