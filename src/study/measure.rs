@@ -10,7 +10,7 @@ use super::norms::{Errors, Measure};
 use super::outcome::Goal;
 use super::search;
 use super::store::{Store, Stored};
-use crate::failure::{Exit, Failure};
+use crate::failure::Failure;
 
 /// How often each setting is cooked, unless `--repeats` says it.
 pub(super) const REPEATS: u32 = 3;
@@ -262,7 +262,10 @@ impl<'a> Study<'a> {
                 Cooked::Failed(why) => last = why,
             }
         }
-        Err(Failure::new(Exit::Cook, format!("no setting could be cooked: {last}")).into())
+        // Each run then fails for itself, and stays in the table with its reason.
+        self.stored.why = format!("none: no setting could be cooked ({last})");
+        self.reference = Some(Reference::default());
+        Ok(())
     }
 
     /// Whether times show that a numeric knob's values were given from fine to coarse.

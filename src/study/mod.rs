@@ -141,6 +141,16 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
             knobs[twice].key
         )));
     }
+    let needed = propose::upstream(&graph, graph.outputs[output].from.node);
+    let is_idle = |knob: &&Knob| {
+        graph.nodes.iter().position(|node| *node.id == *knob.node).is_some_and(|node| !needed.contains(&node))
+    };
+    if let Some(idle) = knobs.iter().find(is_idle) {
+        return Err(wrong(format!(
+            "the output `{name}` does not depend on `{}`, so `{}` cannot change it",
+            idle.node, idle.key
+        )));
+    }
     let paths = Paths::new(args, &name);
     paths.check(args, &graph)?;
     let mut fixed: Vec<(String, String)> =

@@ -48,6 +48,18 @@ pub(super) struct Slope {
     pub(super) declared: Option<f64>,
 }
 
+impl Slope {
+    /// In words; an order that is clearly lower than declared is said to be.
+    pub(super) fn describe(&self) -> String {
+        const CLEARLY: f64 = 0.5;
+        let declared = self.declared.map(|order| {
+            let lower = if self.measured < order - CLEARLY { ": lower than declared" } else { "" };
+            format!(", declared {}{lower}", crate::numbers::short(order))
+        });
+        format!("{:.2} measured{}", self.measured, declared.unwrap_or_default())
+    }
+}
+
 impl Outcome {
     /// The error that the tolerance bounds, as it is; `None` for a failed run.
     pub(super) fn error(&self, run: usize) -> Option<f64> {
@@ -137,7 +149,7 @@ impl Outcome {
             max: a.max.max(b.max),
         })?;
         let show = |error: f64| format!("{} {}", super::table::brief(error), self.unit).trim_end().to_owned();
-        if at_best.mean > 0.8 * near.mean && at_best.max > 0.8 * near.max && at_best.mean > self.rounding {
+        if at_best.mean > 0.8 * near.mean && at_best.max > 0.8 * near.max && at_best.mean > 4.0 * self.rounding {
             return Some(format!(
                 "errors do not fall: the two nearest references differ by {} on average, about as much as the next coarser \
                  setting; the scene is chaotic at these settings, or the knobs do not control its error",
@@ -226,6 +238,14 @@ pub(super) fn order(points: &[(f64, f64)], beyond: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_method_of_first_order_that_declares_second_is_caught() {
+        let points: Vec<(f64, f64)> = [1.0, 0.5, 0.25].iter().map(|h| (*h, 2.0 * (h - 0.125))).collect();
+        let slope = |declared| Slope { knob: "a.b".into(), measured: order(&points, 0.125).unwrap(), declared };
+        assert_eq!(slope(Some(2.0)).describe(), "1.00 measured, declared 2: lower than declared");
+        assert_eq!(slope(Some(1.0)).describe(), "1.00 measured, declared 1");
+    }
 
     #[test]
     fn an_order_is_found_against_an_exact_reference_and_one_beyond() {

@@ -195,7 +195,7 @@ fn goal(svg: &mut Svg, outcome: &Outcome, x: &Axis, y: &Axis) {
             let at = y.at(tolerance);
             svg.line([left, at], [right, at], style);
             let text = format!("tolerance {}", brief(tolerance));
-            svg.text([right - 8.0, at - 6.0], r##"text-anchor="end" fill="#c2410c" font-size="12""##, &text);
+            svg.text([left + 8.0, at - 6.0], r##"fill="#c2410c" font-size="12""##, &text);
         }
         Goal::Budget(ms) if (x.from..=x.to).contains(&libm::log10(ms)) => {
             let at = x.at(ms);
@@ -276,8 +276,7 @@ fn legend(svg: &mut Svg, outcome: &Outcome) {
     let mut lines = Vec::new();
     for slope in outcome.slopes() {
         lines.push(format!("order of {}", slope.knob));
-        let declared = slope.declared.map(|order| format!(", declared {}", short(order))).unwrap_or_default();
-        lines.push(format!("  {:.2} measured{declared}", slope.measured));
+        lines.extend(wrapped(&slope.describe(), 32));
     }
     lines.push(match outcome.floor {
         Some(_) => format!("floor: {} {}", brief(outcome.floor()), outcome.unit),

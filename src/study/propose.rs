@@ -14,13 +14,16 @@ pub(super) fn text(graph: &Graph, output: usize, graph_name: &str) -> String {
     let needed = upstream(graph, graph.outputs[output].from.node);
     let name = &graph.outputs[output].name;
     let mut text = String::new();
-    for node in needed.iter().map(|node| &graph.nodes[*node]) {
+    for index in needed.iter().copied() {
+        let node = &graph.nodes[index];
+        // Where points come and go between the knob and the output, they cannot be matched.
+        let norm = if changes_topology(graph, index, &needed) { " --norm surface" } else { "" };
         for accuracy in node.node().map_or(&[][..], |declared| declared.accuracy) {
             let key = format!("{}.{}", node.id, accuracy.param);
             let order = accuracy.order.map(|order| format!(", order {}", short(order))).unwrap_or_default();
             let _ = match values(node, accuracy) {
                 Some(values) => writeln!(text, "# {} of {}{order}", accuracy.param, node.type_name()).and_then(|()| {
-                    writeln!(text, "convect study {graph_name} --knob {key}={} --output {name}", values.join(","))
+                    writeln!(text, "convect study {graph_name} --knob {key}={} --output {name}{norm}", values.join(","))
                 }),
                 None => writeln!(
                     text,
@@ -40,8 +43,19 @@ pub(super) fn text(graph: &Graph, output: usize, graph_name: &str) -> String {
     }
 }
 
+/// Whether a node, or one of `needed` that depends on it, makes points come and go.
+fn changes_topology(graph: &Graph, node: usize, needed: &BTreeSet<usize>) -> bool {
+    let mut after = BTreeSet::from([node]);
+    for index in needed.range(node + 1..) {
+        if graph.nodes[*index].inputs().iter().flatten().any(|link| after.contains(&link.node)) {
+            after.insert(*index);
+        }
+    }
+    after.iter().any(|index| graph.nodes[*index].node().is_some_and(|declared| declared.changes_topology))
+}
+
 /// The nodes that a node depends on, and itself.
-fn upstream(graph: &Graph, node: usize) -> BTreeSet<usize> {
+pub(super) fn upstream(graph: &Graph, node: usize) -> BTreeSet<usize> {
     let mut needed = BTreeSet::from([node]);
     // Each node comes after those it reads.
     for index in (0..=node).rev() {

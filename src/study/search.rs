@@ -37,6 +37,9 @@ pub(super) type Measured<'a> = &'a mut dyn FnMut(&[usize]) -> Result<Option<(f64
 /// Settings of a grid up to which all are predicted.
 const MOST_PREDICTED: usize = 1 << 20;
 
+/// Predicted settings that are tried in a row without finding a better one.
+const MOST_IN_VAIN: usize = 6;
+
 /// Searches a grid: first along each knob with the others at their best, then the settings that these runs predict to be
 /// best, one after the other. The prediction adds what each knob adds to the error, and multiplies by what it changes of the
 /// time.
@@ -78,12 +81,17 @@ pub(super) fn search(knobs: &[Knob], score: Score<'_>, measure: Measured<'_>) ->
     candidates.sort_by(|a, b| order(&a.0, &b.0));
     let known = along.iter().flatten().flatten().map(|(error, ms)| score(*error, *ms));
     let mut least = known.min_by(order).unwrap_or([f64::INFINITY; 2]);
+    let mut in_vain = 0;
     for (expected, setting) in candidates.into_iter().take(left) {
-        if order(&expected, &least).is_ge() {
+        if order(&expected, &least).is_ge() || in_vain == MOST_IN_VAIN {
             break;
         }
+        in_vain += 1;
         if let Some((error, ms)) = measure(&setting)? {
-            least = [least, score(error, ms)].into_iter().min_by(order).unwrap_or(least);
+            let found = score(error, ms);
+            if order(&found, &least).is_lt() {
+                (least, in_vain) = (found, 0);
+            }
         }
     }
     Ok(())

@@ -42,8 +42,7 @@ pub(super) fn text(outcome: &Outcome) -> String {
     };
     let _ = writeln!(text, "reference: {}", outcome.why);
     for slope in outcome.slopes() {
-        let declared = slope.declared.map(|order| format!(", declared {}", short(order))).unwrap_or_default();
-        let _ = writeln!(text, "order of {}: {:.2} measured{declared}", slope.knob, slope.measured);
+        let _ = writeln!(text, "order of {}: {}", slope.knob, slope.describe());
     }
     sources(outcome, &mut text);
     if let Some(chaos) = outcome.chaos() {

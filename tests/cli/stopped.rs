@@ -12,13 +12,13 @@ use crate::bench::{Bench, Ran, names};
 /// More frames than any test waits for.
 const LONG: &str = "1-1000000";
 
-fn signal(name: &str, child: &Child) {
+pub(crate) fn signal(name: &str, child: &Child) {
     let status = Command::new("sh").args(["-c", &format!("kill -{name} {}", child.id())]).status().unwrap();
     assert!(status.success());
 }
 
 /// Waits until `folder` contains at least `count` files, including hidden ones.
-fn wait_for(count: usize, folder: &Path) {
+pub(crate) fn wait_for(count: usize, folder: &Path) {
     for _ in 0..12_000 {
         if names(folder).len() >= count {
             return;

@@ -3,6 +3,10 @@
 use serde_json::{Value, json};
 
 use super::bench::Bench;
+#[cfg(unix)]
+use super::{bench::Ran, stopped::signal, stopped::wait_for};
+#[cfg(unix)]
+use std::process::Stdio;
 
 /// Upright hairs of one segment that the wind turns into a wall: each stops at its first contact, so what steps get wrong is
 /// a part of one step.
@@ -38,6 +42,21 @@ const SWING: &str = r#"{
     "jiggle": { "type": "Curve_Jiggle", "inputs": { "curves": "wind" }, "params": { "frequency": 6, "damping": 0.15 } }
   },
   "outputs": { "fur": "jiggle" }
+}"#;
+
+/// A soft block that sways gently from a pinned side: smooth motion, without contact.
+const SWAY: &str = r#"{
+  "convect": 1,
+  "scene": { "frames": [1, 12] },
+  "nodes": {
+    "block": { "type": "Mesh_Primitive", "params": { "shape": "box", "size": [0.2, 0.2, 0.2], "divisions": 2 } },
+    "body": { "type": "Tetrahedralize", "inputs": { "surface": "block" } },
+    "wall": { "type": "Point_In", "params": { "points": [[-0.1, 0, 0]] } },
+    "pin": { "type": "Softbody_Pin", "inputs": { "targets": "wall" }, "params": { "radius": 0.12 } },
+    "soft": { "type": "Softbody", "inputs": { "bodies": "body", "pins": "pin" },
+              "params": { "stiffness": 20000, "damping": 0, "volume": 0, "gravity": [0, -0.5, 0] } }
+  },
+  "outputs": { "soft": "soft" }
 }"#;
 
 const STEPS: &str = "bent.rotation_steps=4,8,16,32";
@@ -116,6 +135,16 @@ fn measured_orders_are_those_declared() {
 }
 
 #[test]
+fn a_method_of_lower_order_than_declared_is_caught() {
+    let bench = Bench::with_graph(SWAY);
+    let args = ["study", "g.json", "--knob", "soft.substeps=2,4,8,16", "--repeats", "1", "--quiet", "--fresh"];
+    let table = bench.done(&args);
+    assert!((order(&table) - 2.0).abs() < 0.2 && !table.contains("lower than declared"), "{table}");
+    let euler = bench.done(&[&args[..], &["--set", "soft.integrator=euler", "--set", "soft.damping=0.02"]].concat());
+    assert!(order(&euler) < 1.2 && euler.contains("declared 2: lower than declared"), "{euler}");
+}
+
+#[test]
 fn one_level_finer_moves_no_error_by_more_than_the_floor() {
     let bench = Bench::with_graph(SWING);
     let means = |values: &str| -> (Vec<f64>, f64) {
@@ -142,6 +171,10 @@ fn values_that_are_refused_stay_as_failures() {
     assert!(!found["front"].as_array().unwrap().contains(&json!(0)));
     let svg = String::from_utf8(bench.files("out").remove("grass.svg").unwrap()).unwrap();
     assert!(svg.contains("failed: 1"), "{svg}");
+    let none = bench.run(&["study", "g.json", "--knob", "bent.gap=-1,-2", "--json", "-", "--quiet"]);
+    let failed: Value = serde_json::from_str(&none.stdout).unwrap();
+    assert_eq!((none.code, failed["runs"].as_array().unwrap().len()), (Some(4), 2));
+    assert!(none.stderr.contains("no setting could be cooked"), "{}", none.stderr);
     // A setting beyond which nothing is: the finest that can be cooked is the reference, and the floor is unknown.
     let words = study(&bench, &["--knob", "bent.method=steps,exact"]);
     assert_eq!((&words["floor"]["mean"], &words["runs"][1]["error"]["max"]), (&Value::Null, &json!(0.0)));
@@ -195,9 +228,10 @@ fn a_tolerance_below_the_floor_or_out_of_reach_is_not_claimed() {
 
 #[test]
 fn wrong_names_are_refused_with_what_was_meant() {
-    let bench = Bench::with_graph(WALL);
+    let bench = Bench::with_graph(&WALL.replace("\"grass\": \"bent\"", "\"grass\": \"bent\", \"still\": \"put\""));
     let refused = |code: i32, args: &[&str], text: &str| {
-        let ran = bench.run(&[&["study", "g.json"], args].concat());
+        let output = if args.contains(&"--output") { &[][..] } else { &["--output", "grass"] };
+        let ran = bench.run(&[&["study", "g.json"], args, output].concat());
         assert_eq!(ran.code, Some(code), "{}", ran.stderr);
         assert!(ran.stderr.contains(text), "{}", ran.stderr);
         assert!(!bench.path("out").join("grass.svg").exists());
@@ -205,6 +239,7 @@ fn wrong_names_are_refused_with_what_was_meant() {
     refused(3, &["--knob", "bnt.rotation_steps=1,2"], "there is no node `bnt`; did you mean `bent`?");
     refused(3, &["--knob", "bent.rotatoin_steps=1,2"], "did you mean `rotation_steps`?");
     refused(2, &["--knob", "bent=1,2"], "`bent=1,2` is not a knob; write node.param=VALUE");
+    refused(2, &["--knob", "blades.cvs=2,4", "--output", "still"], "the output `still` does not depend on `blades`");
     refused(2, &["--knob", STEPS, "--output", "fur"], "the graph has no output `fur`");
     refused(2, &["--knob", STEPS, "--norm", "bent.nothing"], "has no metric `nothing`; it has `");
     refused(2, &["--knob", STEPS, "--norm", "heat"], "the output has no attribute `heat`");
@@ -264,6 +299,23 @@ fn finished_runs_are_kept_for_the_same_command_only() {
     assert!(!run("bent.rotation_steps=4,8").stderr.contains("are taken from"));
     bench.write("g.json", &WALL.replace("2000", "1500"));
     assert!(!run("bent.rotation_steps=4,8").stderr.contains("are taken from"));
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_writes_what_was_measured_and_the_same_command_goes_on() {
+    let bench = Bench::with_graph(WALL);
+    let args = ["study", "g.json", "--knob", STEPS, "--json", "runs.json", "--repeats", "1000"];
+    let child = bench.command(&args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    wait_for(1, &bench.path("out"));
+    signal("INT", &child);
+    let ran = Ran::of(&child.wait_with_output().unwrap());
+    assert_eq!(ran.code, Some(130), "{}", ran.stderr);
+    assert!(ran.stderr.contains("interrupted; 4 runs are kept") && ran.stdout.contains("floor: "), "{}", ran.stderr);
+    assert_eq!(bench.read_json("runs.json")["runs"].as_array().unwrap().len(), 4);
+    assert_eq!(bench.names("out"), ["grass.study.json", "grass.svg"], "and no temporaries");
+    let ran = bench.run(&["study", "g.json", "--knob", STEPS, "--repeats", "1"]);
+    assert!(ran.stderr.contains("4 runs are taken from"), "{}", ran.stderr);
 }
 
 #[test]
