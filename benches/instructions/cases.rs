@@ -179,6 +179,18 @@ pub(crate) const CASES: &[Case] = &[
         output: "node",
         frames: 2,
     },
+    Case {
+        name: "Curve_Wind_Collision, a still skin",
+        nodes: &[
+            FUR,
+            r#""wind": { "type": "Curve_Wind", "inputs": { "curves": "fur" }, "params": {
+                   "wind_dir": { "expr": ["cos(0.1*frame)", "0.2", "sin(0.1*frame)"] }, "noise": "none", "global_rotate": 0.8 } },
+               "node": { "type": "Curve_Wind_Collision", "inputs": { "curves": "wind", "rest": "fur", "colliders": ["ball"] } }"#,
+        ],
+        before: &["fur", "ball"],
+        output: "node",
+        frames: 8,
+    },
     Case { name: "Tetrahedralize", nodes: &[DOUGH], before: &["placed"], output: "body", frames: 1 },
     Case {
         name: "Softbody_Goal",

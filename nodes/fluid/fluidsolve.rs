@@ -193,11 +193,11 @@ metrics! { METRICS:
             {volume} m³ of liquid, {spray} of spray, {sunk} sunk, {left_domain} left, {sourced} sourced. Raise `resolution`, or lower \
             `cell` where colliders or sheets of liquid are thinner than two cells.");
     MATERIAL_DRIFT = Metric::new("material_drift", Unit::None,
-        "Where liquids of several viscosities or densities meet: the largest error of the volume of one of them, relative to what \
-            it should be.")
-        .warn_outside(-1.0, 0.1, "One of the liquids of different viscosity or density has {material_drift} more or less than it \
-            should have: the others took its place, or gave it up. A layer thinner than a cell cannot be told from what is around it: \
-            use smaller cells.");
+        "Where liquids of several viscosities or densities meet: the largest error of the share that one of them has of the \
+            volume, relative to what it should be.")
+        .warn_outside(-1.0, 0.1, "Of one of the liquids that differ in viscosity or density there is too much or too little, by \
+            {material_drift} of what there should be: others took its place, or it took theirs. A layer thinner than a cell cannot be told \
+            from what is around it: use smaller cells.");
     SPRAY = Metric::new("spray", Unit::CubicMetres,
         "Volume of drops too small for the grid, which fly on their own as `spray` in `particles`.");
     EULER_CHARACTERISTIC = Metric::new("euler_characteristic", Unit::None,
@@ -211,8 +211,8 @@ metrics! { METRICS:
     COLLIDER_FORCE_Z = Metric::new("collider_force_z", Unit::Newtons, "The same along z.");
     WITHHELD = Metric::new("withheld", Unit::CubicMetres,
         "Volume that the rates of sources and sinks asked for in the frame and that could not pass.")
-        .warn_above(1e-9, "Sources could not give, or sinks not take, what their rates ask for, most of it wire {withheld_wire} \
-            (counted from 0 through `sources`, then `sinks`): the liquid has nowhere to go, or there is none to take. Open a wall, \
+        .warn_above(1e-9, "Sources could not give, or sinks not take, what their rates ask for, most of it \
+            {sources+sinks:withheld_wire}: the liquid has nowhere to go, or there is none to take. Open a wall, \
             make room, or move the source or sink.");
     WITHHELD_WIRE = Metric::new("withheld_wire", Unit::None,
         "The wire of which most was withheld in the frame, counted from 0 through `sources`, then `sinks`.");

@@ -11,26 +11,20 @@
 //! * Goals act on inner particles with critical damping, so bodies come to rest in them.
 //! * Masks of materials are read at the start and may not change; their numbers may be keyed.
 
-use std::sync::{Arc, OnceLock};
-
-use bodies::collision::{CollisionScene, ContactParams, Ground};
-use bodies::mass_spring::{BodySolver, Integrator, Plasticity, SoftBody, SolverFrame, State, flow, reset, tear};
 use engine::prelude::*;
-use serde::{Deserialize, Serialize};
 
 use crate::shared::attributes::{
     BODY_NUMBER, GOAL_FRAME, GOAL_HOLD, GOAL_START, GOAL_STRENGTH, PIN_RADIUS, PIN_RELEASE, PIN_STRENGTH, SLIVER,
     SURFACE_POINT,
 };
-use goals::{GoalHistory, Goals};
-use measured::measured;
-use setup::{MaterialFields, ParticleNumber, SimulationSetup, StartInputs, refusal};
+use run::Run;
 
 mod goals;
 mod joints;
 mod measured;
 mod obstacles;
 mod pins;
+mod run;
 mod setup;
 
 choice! {
@@ -80,7 +74,10 @@ params! { PARAMS:
         "Mass per volume. At the same stiffness, denser bodies sag more.")
         .unit(Unit::KilogramsPerCubicMetre).above(0.0).soft(100.0, 3000.0);
     STIFFNESS: Param<Maskable> = Param::maskable("stiffness", 5e3,
-        "Resistance to stretching (Young's modulus): dough 1e3 to 1e4, gelatine 1e4, rubber 1e6.")
+        "Resistance to stretching (Young's modulus): dough 1e3 to 1e4, gelatine 1e4, rubber 1e6. To carry its weight a \
+         body needs about `density` × gravity × its height: with that much it sags by a sixth, with a quarter of it to \
+         half its height, with a twentieth tets turn inside out, and with less than a thousandth it is a flat heap that \
+         loses its volume.")
         .unit(Unit::Pascal).at_least(0.0).soft(0.0, 1e6);
     DAMPING: Param<Maskable> = Param::maskable("damping", 0.01,
         "How quickly wobbling fades: the ratio of the springs' damping to their stiffness. With 0 bodies keep \
@@ -191,6 +188,11 @@ metrics! { METRICS:
     INVERTED_TETS = Metric::new("inverted_tets", Unit::None, "Tets that are inside out.")
         .warn_above(0.0, "Parts of a body are turned inside out: something squeezes it harder than it can resist. \
             Raise `volume` or `stiffness`, slow the colliders, or leave more room between them.");
+    STIFFNESS_TO_WEIGHT = Metric::new("stiffness_to_weight", Unit::None,
+        "How well the softest body carries its own weight: `stiffness` ÷ (density × gravity × height). Missing without \
+         weight, or without colliders and ground to lie on.")
+        .warn_outside(0.25, f64::INFINITY, "A body is too soft to carry its weight: it flattens where it lies. Raise \
+            `stiffness`, or lower `density` or `gravity`.");
     CONTACTS = Metric::new("contacts", Unit::None, "Contacts in which surfaces press on each other.");
     DEEPEST_OVERLAP = Metric::new("deepest_overlap", Unit::Metres,
         "By how much surfaces came closer than `thickness` at the worst contact. More than `thickness` means \
@@ -199,9 +201,13 @@ metrics! { METRICS:
         "By how much `deepest_overlap` exceeds `thickness`: how far surfaces went through each other.")
         .warn_above(0.0, "Surfaces went through each other. Set more `substeps`, slow the colliders, leave more room \
             between them, or raise `thickness`.");
+    JAMMED = Metric::new("jammed", Unit::None,
+        "Contacts with colliders that leave no room above the ground: less than twice `thickness`.")
+        .warn_above(0.0, "A collider closes on the ground with a body between, where there is no room for it. It counts \
+            as stopped above the ground there, and passes through the body. Keep it higher by 2 `thickness` or more.");
     STARTED_INSIDE = Metric::new("started_inside", Unit::None,
-        "Particles of surfaces that are deeper than `thickness` inside a closed collider, inside another body, or below \
-         the ground when the simulation starts.")
+        "Particles that are deeper than `thickness` inside a closed collider, inside another body, or below the ground \
+         when the simulation starts.")
         .warn_above(0.0, "Bodies start inside a collider, inside each other or below the ground, and are pushed out \
             abruptly, or on the wrong side. Move them apart at `start_frame`.");
     LET_GO = Metric::new("let_go", Unit::None,
@@ -214,28 +220,27 @@ metrics! { METRICS:
     GOAL_MISS = Metric::new("goal_miss", Unit::None,
         "How near a body came to a goal while it should have had its shape: mean distance relative to the size of the \
          body. The largest of all goals so far; missing before the first.")
-        .warn_last_above(0.25, "`bodies` {goal_miss_body} never comes near `goals` {goal_miss_goal} (both counted from \
-            0): something is in the way, or the goal is too weak. Raise `strength` of Softbody_Goal, give the body more \
+        .warn_last_above(0.25, "{bodies:goal_miss_body} never comes near {goals:goal_miss_goal}: something is in the way, or the goal is too weak. Raise `strength` of Softbody_Goal, give the body more \
             frames to get there, or lower `stiffness`; see whether colliders, pins or the ground hold it back.");
     GOAL_MISS_BODY = Metric::new("goal_miss_body", Unit::None, "The wire of that body, from 0.");
     GOAL_MISS_GOAL = Metric::new("goal_miss_goal", Unit::None, "The wire of that goal, from 0.");
     IDLE_GOALS = Metric::new("idle_goals", Unit::None, "Goals that have no particle to pull.")
-        .warn_above(0.0, "`goals` {idle_goals_wire} (counted from 0) has no effect: its body has no particle of the kind \
+        .warn_above(0.0, "{goals:idle_goals_wire} has no effect: its body has no particle of the kind \
             that `goal_on` names. Make inner points with `interior` and a smaller `spacing` of Tetrahedralize, or set \
             `goal_on` to `all`.");
     IDLE_GOALS_WIRE = Metric::new("idle_goals_wire", Unit::None, "The first of these goals, from 0; −1 if there is none.");
     EARLY_GOALS = Metric::new("early_goals", Unit::None, "Goals that are over when the simulation starts.")
-        .warn_above(0.0, "`goals` {early_goals_wire} (counted from 0) is over when the simulation starts, so it does not \
+        .warn_above(0.0, "{goals:early_goals_wire} is over when the simulation starts, so it does not \
             pull. Give it a `frame` after the simulation's `start_frame`.");
     EARLY_GOALS_WIRE = Metric::new("early_goals_wire", Unit::None, "The first of these goals, from 0; −1 if there is none.");
     DOUBLED_GOALS = Metric::new("doubled_goals", Unit::None, "Goals at whose frame their body is still held by another goal.")
-        .warn_above(0.0, "At the `frame` of `goals` {doubled_goals_wire} (counted from 0) its body is still held by another \
+        .warn_above(0.0, "At the `frame` of {goals:doubled_goals_wire} its body is still held by another \
             goal, so it jumps from one to the other. Give each goal a `frame` after the `frame` and `hold` of the one \
             before it.");
     DOUBLED_GOALS_WIRE = Metric::new("doubled_goals_wire", Unit::None, "The first of these goals, from 0; −1 if there is none.");
     IDLE_PINS = Metric::new("idle_pins", Unit::None, "Pins with no particle within their `radius` at the start.")
-        .warn_above(0.0, "These pins hold nothing; the first is point {idle_pins_point} of `pins` {idle_pins_wire} (both \
-            counted from 0). Move them to the body at `start_frame`, or raise their `radius`.");
+        .warn_above(0.0, "These pins hold nothing; the first is point {idle_pins_point} (from 0) of \
+            {pins:idle_pins_wire}. Move them to the body at `start_frame`, or raise their `radius`.");
     IDLE_PINS_WIRE = Metric::new("idle_pins_wire", Unit::None, "The wire of the first of these pins, from 0; −1 if there is none.");
     IDLE_PINS_POINT = Metric::new("idle_pins_point", Unit::None, "The point of the first of these pins, from 0; −1 if there is none.");
     PINNED = Metric::new("pinned", Unit::None,
@@ -246,12 +251,11 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
-    2,
+    3,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
      other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
      pins hold them. `stiffness` has the same effect at any mesh resolution, and the solver is stable for any \
-     stiffness, mass and initial state. Inner particles do not collide: bodies softer than a few hundred pascals may \
-     collapse and come out through their surface.",
+     stiffness, mass and initial state.",
     Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),
 )
 .inputs(INPUTS)
@@ -278,174 +282,6 @@ pub(crate) static NODE: Node = Node::new(
 .writes(&[&P, &BODY_NUMBER])
 .metrics(METRICS)
 .leaves_out(leaves_out);
-
-/// The state of the simulation.
-#[derive(Serialize, Deserialize)]
-struct Run {
-    inputs: StartInputs,
-    state: State,
-    goals: GoalHistory,
-    /// Metrics of the last step; empty at the start.
-    metrics: MetricValues,
-    /// Computed from `inputs` only, and recomputed after a checkpoint.
-    #[serde(skip)]
-    setup: OnceLock<Arc<SimulationSetup>>,
-    #[serde(skip)]
-    solving: Option<Solving>,
-}
-
-/// The solver with its body.
-struct Solving {
-    body: SoftBody,
-    solver: BodySolver,
-    /// The body's density, stiffness and damping.
-    values: [f32; 3],
-}
-
-impl Chain for Run {
-    fn start(cx: &FrameCx) -> Result<Self> {
-        let inputs = StartInputs::at(cx);
-        let setup = SimulationSetup::of(cx, &inputs)?;
-        let solving = Solving::new(&setup, &MaterialFields::at(cx, &inputs)?)?;
-        let mut state = State::at_rest(&solving.body);
-        state.velocities.fill(cx.get(INITIAL_VELOCITY).map(f64::from));
-        let setup = OnceLock::from(Arc::new(setup));
-        let (goals, metrics) = (GoalHistory::default(), MetricValues::default());
-        Ok(Self { inputs, state, goals, metrics, setup, solving: Some(solving) })
-    }
-
-    fn step(&mut self, cx: &StepCx) -> Result<()> {
-        let setup = self.setup(cx)?;
-        let material = MaterialFields::at(cx, &self.inputs)?;
-        let mut solving = match self.solving.take() {
-            Some(solving) => solving.of(&material)?,
-            None => Solving::new(&setup, &material)?,
-        };
-        let times = [cx.previous(), cx.frame()].map(Frame::number);
-        let seconds = cx.dt() * f64::from(cx.get(TIME_SCALE));
-        let on = cx.get(GOAL_ON);
-        let (whole, frames) = (f64::from(cx.get(RESET_TO_GOALS)), cx.get(RESET_FRAMES) as f64);
-        let mut goals = Goals::of(&self.inputs, &setup, &cx.part(GOALS), cx.get(START_FRAME) as f64, &mut self.goals)?;
-        goals.start(times, &self.state.positions);
-        let (mut pulled, mut held) = (Vec::new(), Vec::new());
-        goals.pull(times, on, &mut pulled);
-        let by_goals = pulled.len();
-        if let [(_, before), .., (_, now)] = cx.samples(PINS) {
-            pins::pull(&setup.pins.bindings, [before, now], cx.frame(), &mut held, &mut pulled)?;
-        }
-        let pinned = held.len() + pulled.len() - by_goals;
-        let contact_friction = ParticleNumber::of(cx, &self.inputs, FRICTION)?;
-        let (friction, thickness) = (f64::from(contact_friction.value), f64::from(cx.get(THICKNESS)));
-        let obstacles = obstacles::obstacles(cx.samples(COLLIDERS), seconds, thickness, friction)?;
-        let rub = ContactParams { thickness, friction };
-        let ground = Ground { up: [0.0, 1.0, 0.0], height: f64::from(cx.get(GROUND_HEIGHT)), thickness, friction };
-        let scene = CollisionScene {
-            skins: &setup.skins,
-            friction: contact_friction.mask.as_deref(),
-            ground: cx.get(GROUND).then_some(ground),
-            obstacles: &obstacles,
-            body_contact: (cx.get(BODY_COLLISION) && setup.skins.len() > 1).then_some(rub),
-            self_contact: cx.get(SELF_COLLISION).then_some(rub),
-        };
-        let touches = scene.ground.is_some()
-            || !obstacles.is_empty()
-            || scene.body_contact.is_some()
-            || scene.self_contact.is_some();
-        let frame = SolverFrame {
-            seconds,
-            gravity: cx.get(GRAVITY).map(f64::from),
-            drag: f64::from(cx.get(DRAG)),
-            volume: f64::from(cx.get(VOLUME)),
-            goals: &pulled,
-            pins: &held,
-            contacts: if touches { Some(&scene) } else { None },
-            integrator: match cx.get(INTEGRATOR) {
-                Stepping::Default => Integrator::Default,
-                Stepping::Accurate => Integrator::Accurate { tolerance: cx.get(TOLERANCE) },
-                Stepping::Euler => Integrator::Euler,
-            },
-            substeps: cx.get(SUBSTEPS) as u32,
-            force_implicit_euler: goals.reset_at(times[0], whole, frames),
-            cancelled: &|| cx.check_cancelled().is_err(),
-        };
-        // Positions are those of the start only in the first step.
-        let started_inside =
-            self.metrics.get(STARTED_INSIDE).unwrap_or_else(|| scene.count_inside(&self.state.positions) as f64);
-        let report = solving.solver.step(&solving.body, &mut self.state, &frame);
-        cx.check_cancelled()?;
-        let plasticity =
-            Plasticity { yield_strain: f64::from(cx.get(PLASTIC_YIELD)), creep: f64::from(cx.get(PLASTIC_CREEP)) };
-        let drawn = goals.shape(times[1]);
-        let plastic_work = flow(&solving.body, &mut self.state, plasticity, seconds, drawn.as_deref());
-        let mut brought = 0.0;
-        let keep = f64::from(cx.get(KEEP_DENTS));
-        goals.resets(times[1], whole, frames, |shape, share| {
-            brought += reset(&solving.body, &mut self.state, shape, share, keep);
-        });
-        let stretch = f64::from(cx.get(COUPLING_BREAK));
-        if setup.joints() > 0 && stretch > 0.0 {
-            let _ = tear(&solving.body, &mut self.state, stretch, NEAR * solving.body.size());
-        }
-        let far = goals.distance(times[1], on, &self.state.positions);
-        let let_go = if obstacles.is_empty() { 0 } else { setup.let_go(&self.state.positions) };
-        self.metrics = measured(&report, &self.state);
-        self.metrics.set(RESET_ENERGY, brought);
-        self.metrics.set(PLASTIC_WORK, plastic_work);
-        self.metrics.set(LET_GO, let_go as f64);
-        self.metrics.set(STARTED_INSIDE, started_inside);
-        let thickness = f64::from(cx.get(THICKNESS));
-        self.metrics.set(DEEPEST_PENETRATION, (report.deepest_overlap - thickness).max(0.0));
-        self.metrics.set(GOAL_DISTANCE, far.unwrap_or(0.0));
-        goals.measure(times[1], on, &self.state.positions, &mut self.metrics);
-        self.metrics.set(PINNED, pinned as f64);
-        self.solving = Some(solving);
-        Ok(())
-    }
-
-    fn output(&self, cx: &FrameCx) -> Result<Outputs> {
-        let setup = self.setup(cx)?;
-        cx.publish_all(&self.metrics);
-        cx.publish(IDLE_PINS, setup.pins.idle.len() as f64);
-        let first = setup.pins.idle.first().map_or([-1.0; 2], |first| first.map(|index| index as f64));
-        cx.publish(IDLE_PINS_WIRE, first[0]);
-        cx.publish(IDLE_PINS_POINT, first[1]);
-        let narrow = |p: [f64; 3]| p.map(|x| x as f32);
-        let (mut surface, mut tets) = (setup.surface.clone(), setup.body.clone());
-        surface
-            .set(P, setup.carriers.iter().map(|carrier| narrow(carrier.position(&self.state.positions))).collect())?;
-        tets.set(P, self.state.positions.iter().map(|p| narrow(*p)).collect())?;
-        Ok(SURFACE.with(Geometry::from(surface)).and(TETS, Geometry::from(tets)))
-    }
-}
-
-/// Length below which a coupling spring of rest length 0 does not tear, relative to the size of the bodies.
-const NEAR: f64 = 1e-6;
-
-impl Run {
-    fn setup(&self, cx: &Cx) -> Result<Arc<SimulationSetup>> {
-        if let Some(setup) = self.setup.get() {
-            return Ok(setup.clone());
-        }
-        let setup = Arc::new(SimulationSetup::of(cx, &self.inputs)?);
-        Ok(self.setup.get_or_init(|| setup).clone())
-    }
-}
-
-impl Solving {
-    fn new(setup: &SimulationSetup, material: &MaterialFields) -> Result<Self> {
-        let body = setup.body(material)?;
-        Ok(Self { solver: BodySolver::new(&body), body, values: material.values() })
-    }
-
-    /// The solver with the current material.
-    fn of(mut self, material: &MaterialFields) -> Result<Self> {
-        if self.values != material.values() {
-            self.body.set_material(&material.material()).map_err(refusal)?;
-            self.values = material.values();
-        }
-        Ok(self)
-    }
-}
 
 fn couples(params: &Params) -> bool {
     params.get(COUPLING_RADIUS) > 0.0

@@ -2,7 +2,7 @@
 //!
 //! W3. Root to tip, each segment starts from its rest direction, carried along by the turns of the segments before it,
 //! and turns towards the direction that the wind gave it until it meets a collider. A segment that an earlier turn has
-//! pushed into a collider is first turned out of it. `offset_root` lifts roots off the skin; `offset_scale` keeps
+//! pushed into a collider is first turned out of it. `offset_root` lifts roots off the skin, in creases off all faces; `offset_scale` keeps
 //! curves that the wind presses flat at a fraction of their rest height.
 //!
 //! Departures:
@@ -13,6 +13,8 @@
 //!   skin beforehand by a continuous map: on the bear, in wind that moves 0.50 % of all curves by more than a quarter
 //!   of their length in a frame, collision raises that to 1.07 %, and to 0.70 % at `coherence` 1
 //!   (tests/wind/coherence.rs).
+//! * A segment may be carried to where no turn about its CV frees it, which W leaves open. Then the whole curve is blended
+//!   towards rest, up to its first pose that crosses nothing.
 //! * `offset_scale` only raises segments that would lie lower: wind may lift fur off the skin.
 
 use std::sync::Arc;
@@ -48,13 +50,19 @@ params! { PARAMS:
         segments stop closer to the contact, at proportionally higher cost.")
         .within(1.0, 1e6).soft(2.0, 64.0).when(|params| params.get(METHOD) == Method::Steps);
     OFFSET_ROOT: Param<f64> = Param::double("offset_root", 1e-4,
-        "How far outside the skin each root is moved, together with its curve. If this is less than `gap`, the \
+        "How far outside the skin each root is moved, together with its curve: in a crease this far from all its faces, if \
+         a move of 4 times this distance reaches that. If this is less than `gap`, the \
          beginning of a curve is not tested, because it touches the skin.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     OFFSET_SCALE: Param<f64> = Param::double("offset_scale", -1.0,
         "Minimum height above the skin, relative to the height at rest: 1 keeps the volume of the coat, smaller values \
          let the wind press it down. Negative values turn this off.")
         .soft(-1.0, 1.0);
+    LOFT: Param<f64> = Param::double("loft", 0.0,
+        "Share of its height at rest, above the tangent plane of the skin at its root, that a CV keeps which the wind blows \
+         below it: a little keeps a coat from lying glued to the skin, and costs nothing. `coherence` scales it by \
+         1 − its own value. 0 is the paper's.")
+        .within(0.0, 1.0).when(|params| params.get(OFFSET_SCALE) < 0.0 && params.get(COHERENCE) < 1.0);
     GAP: Param<f64> = Param::double("gap", 1e-4,
         "Distance, along the arc of its turn, at which a segment stops before a contact.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
@@ -72,21 +80,29 @@ params! { PARAMS:
          them out of the colliders. Lengths are kept at any value.").within(0.0, 1.0);
 }
 
+/// Number of a curve's segments that cross a collider.
+const UNFREED_SEGMENTS: Attr<i32> = Attr::element("unfreed");
+
 const OUT: Output = Output::like("curves", &CURVES, "The curves, bent around the colliders. Lengths are kept.");
 
 metrics! { METRICS:
     CROSSINGS_LEFT = Metric::new("crossings_left", Unit::None,
         "Segments of the output that cross a collider. Not counted while `blend` is 0.")
         .warn_above(0.0,
-        "These segments still reach into a collider. Either no turn about the CV before them frees them \
-         (`unfreed_segments`), because their roots lie deep in the skin or they are caught between two colliders; or \
-         they begin closer to it than `gap`. Raise `offset_root`, or start from curves that are clear of the \
-         colliders.");
-    UNFREED = Metric::new("unfreed_segments", Unit::None, "Segments that cross a collider and that no turn can free.");
+        "These segments still reach into a collider; `unfreed` of the output says on which curves, so that they can be \
+         seen and hidden. Either their curves cross a collider at rest and no turn frees them (`unfreed_segments`); or \
+         `blend` is below 1. Raise `offset_root`, or start from curves that are clear of the colliders.");
+    UNFREED = Metric::new("unfreed_segments", Unit::None,
+        "Segments that cross a collider and that no turn can free, of curves that cross one at rest too.");
+    BLENDED = Metric::new("blended_to_rest", Unit::None,
+        "Curves that turns alone did not free: they are blended towards rest up to their first pose without a crossing.");
     STARTED_INSIDE = Metric::new("started_inside", Unit::None, "Curves that cross a collider in their rest shape.")
         .warn_above(0.0, "These curves cross a collider before any wind blows, so there is no free position to start \
             from: they are turned outwards as far as possible. Clear them of the collider in their rest shape, raise \
             `offset_root`, or leave out that collider.");
+    LOW_ROOTS = Metric::new("low_roots", Unit::None,
+        "Roots in creases so narrow that a move of 4 times `offset_root` does not bring them that far from all faces. \
+         They are as far from them as such a move brings them.");
     CONTACTS = Metric::new("contacts", Unit::None,
         "Segments stopped by a collider before they reach the direction that the wind gave them.");
     DEEPEST = Metric::new("deepest_overlap", Unit::Metres,
@@ -96,10 +112,11 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Collision",
-    3,
+    4,
     "Keeps curves that are bent by wind out of colliders. Each segment, root to tip, turns from its rest direction \
      towards the direction that the wind gave it, until it touches a collider. Place this node after the wind, and \
-     wire the curves from before the wind into `rest`. Metrics count the segments that could not be freed.",
+     wire the curves from before the wind into `rest`. `unfreed` is the number of segments of each curve that still \
+     cross a collider.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -113,13 +130,14 @@ pub(crate) static NODE: Node = Node::new(
 ])
 .outputs(&[&OUT])
 .reads(&[&P])
-.writes(&[&P])
+.writes(&[&P, &UNFREED_SEGMENTS])
 .metrics(METRICS)
 .neutral(|params, wires| match params {
     _ if wires.count(&COLLIDERS) + wires.count(&SKIN) == 0 => Some("neither `colliders` nor `skin` is wired"),
     _ if params.get(BLEND).value == 0.0 => Some("`blend` is 0"),
     _ => None,
 })
+.neutral_fills(&[Fill::always_int(UNFREED_SEGMENTS, 0)])
 .leaves_out(|params, _| {
     let mut left_out = Vec::new();
     if params.get(COHERENCE) == 0.0 {
@@ -127,6 +145,9 @@ pub(crate) static NODE: Node = Node::new(
     }
     if params.get(OFFSET_SCALE) < 0.0 {
         left_out.push(LeftOut::new("offset", "`offset_scale` is below 0"));
+    }
+    if params.get(LOFT) == 0.0 {
+        left_out.push(LeftOut::new("loft", "`loft` is 0"));
     }
     left_out
 });
@@ -156,6 +177,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         gap: cx.get(GAP),
         offset_root: cx.get(OFFSET_ROOT),
         offset_scale: Some(cx.get(OFFSET_SCALE)).filter(|scale| *scale >= 0.0),
+        loft: cx.get(LOFT),
         at_rest: None,
         blend: cx.mask(BLEND, &curves)?,
         width: cx.mask(WIDTH, &curves)?,
@@ -163,17 +185,22 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let starts = curves.runs().starts();
     // Computed once for still colliders and curves.
     let tree = skin.as_ref().map(|skin| skin.tree().clone());
-    let still = Still { obstacles: trees.clone(), skin: tree, offset: how.offset_root };
+    let still = Still { obstacles: trees.clone(), skin: tree, offset: how.offset_root, lofts: how.loft > 0.0 };
     let at_rest = rest.kept(still, || Ok(at_rest(starts, rest.positions(), &how)))?;
     how.at_rest = Some(&at_rest);
     let collided = collide(starts, rest.positions(), curves.positions(), &how);
     cx.publish(CROSSINGS_LEFT, collided.crossings_left as f64);
     cx.publish(UNFREED, collided.unfreed_segments as f64);
+    cx.publish(BLENDED, collided.blended_to_rest as f64);
     cx.publish(STARTED_INSIDE, collided.started_inside as f64);
+    cx.publish(LOW_ROOTS, collided.low_roots as f64);
     cx.publish(CONTACTS, collided.contacts as f64);
     cx.publish(DEEPEST, collided.deepest_overlap);
     cx.publish(LENGTH_ERROR, collided.length_error);
     curves.set(P, collided.points)?;
+    if cx.wants(UNFREED_SEGMENTS) {
+        curves.set(UNFREED_SEGMENTS, collided.crossings)?;
+    }
     Ok(OUT.with(curves))
 }
 
@@ -182,6 +209,7 @@ struct Still {
     obstacles: Vec<Arc<TriangleTree>>,
     skin: Option<Arc<TriangleTree>>,
     offset: f64,
+    lofts: bool,
 }
 
 impl PartialEq for Still {
@@ -191,7 +219,7 @@ impl PartialEq for Still {
             && self.obstacles.iter().zip(&other.obstacles).all(same)
             && self.skin.iter().zip(&other.skin).all(same)
             && self.skin.is_some() == other.skin.is_some()
-            && self.offset == other.offset
+            && (self.offset, self.lofts) == (other.offset, other.lofts)
     }
 }
 

@@ -112,6 +112,7 @@ impl ContactFinder for SceneContacts<'_> {
                         gap: GAP,
                         velocity: after.velocity.into(),
                         friction: FRICTION,
+                        jammed: false,
                     });
                 }
             }

@@ -330,23 +330,23 @@ fn what_goes_wrong_with_a_soft_body_is_noted() {
     let capped = |note: &&String| note.starts_with("`soft` (Softbody): `caps_hit` is ");
     assert_eq!(found.iter().filter(capped).count(), 1, "{found:#?}");
     let far = ["[[0, 0.05, 0]]", "[[0, 0.05, 0], [0, 1, 0]]"];
-    let idle = "the first is point 1 of `pins` 0 (both counted from 0)";
+    let idle = "the first is point 1 (from 0) of `pin` at `pins`.";
     only(&[far], "`soft` (Softbody): `idle_pins` is 1 at frame 1 (frames 1-6)", idle);
     let doubled = [r#""frame": 6"#, r#""frame": 4"#];
     only(
         &[doubled],
         "`soft` (Softbody): `doubled_goals` is 1 at frame 2",
-        "At the `frame` of `goals` 1 (counted from 0)",
+        "At the `frame` of `later` at `goals` its body",
     );
     let early = [r#""frame": 6"#, r#""frame": -6"#];
-    only(&[early], "`soft` (Softbody): `early_goals` is 1 at frame 2", "`goals` 1 (counted from 0) is over when the");
+    only(&[early], "`soft` (Softbody): `early_goals` is 1 at frame 2", "`later` at `goals` is over when the");
     let hollow = [r#"{"surface": "ball"}"#, r#"{"surface": "ball"}, "params": {"interior": false}"#];
-    only(&[hollow], "`soft` (Softbody): `idle_goals` is 2 at frame 2", "`goals` 0 (counted from 0) has no effect");
+    only(&[hollow], "`soft` (Softbody): `idle_goals` is 2 at frame 2", "`goal` at `goals` has no effect");
     let weak = [r#""strength": 1e4"#, r#""strength": 1e-3"#];
     let away = [r#""scale": [0.9, 1.1, 1]"#, r#""scale": [0.9, 1.1, 1], "translate": [0, 0.2, 0]"#];
     only(&[weak, away], "`soft` (Softbody): `goal_miss` is ", "Raise `strength` of Softbody_Goal");
     let second = [r#""frame": 6, "strength": 1e4"#, r#""frame": 6, "start_frame": 5, "strength": 1e-3"#];
-    let named = "`bodies` 0 never comes near `goals` 1 (both counted from 0)";
+    let named = "`body` at `bodies` never comes near `later` at `goals`: ";
     let elsewhere = [
         r#""later": {"type": "Softbody_Goal", "inputs": {"body": "body", "shape": "egg"}"#,
         r#""away": {"type": "Transform", "inputs": {"geometry": "ball"}, "params": {"translate": [0, 0.2, 0]}},

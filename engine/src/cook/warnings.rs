@@ -7,12 +7,16 @@ use crate::node::{Metric, Trouble};
 use crate::note::Note;
 use crate::time::Frame;
 
+/// How a person finds a wire: given the inputs that it is counted through, with `+` between them, and its number from 0.
+pub(super) type WireNames<'a> = &'a dyn Fn(&str, usize) -> Option<String>;
+
 /// One note for each metric with such a value at any frame: its worst value, and at which frames there are others.
 pub(super) fn notes(
     id: &Name,
     type_name: &str,
     declared: &[&Metric],
     published: &BTreeMap<&'static str, BTreeMap<Frame, f64>>,
+    wired: WireNames<'_>,
 ) -> Vec<Note> {
     let note = |metric: &&Metric| {
         let warning = metric.warning?;
@@ -34,17 +38,33 @@ pub(super) fn notes(
         };
         let text = format!("`{id}` ({type_name}): `{}` is {}{unit} at frame {frame}", metric.name, rounded(**worst));
         let frames = over.iter().map(|(frame, _)| **frame).collect();
-        Some(Note::new(metric.name, text).of_node(id).at(frames).hint(filled(warning.text, **frame, published)))
+        Some(Note::new(metric.name, text).of_node(id).at(frames).hint(filled(warning.text, **frame, published, wired)))
     };
     declared.iter().filter_map(note).collect()
 }
 
-/// A text with the names of metrics in braces replaced by their values at a frame.
-fn filled(text: &str, frame: Frame, published: &BTreeMap<&'static str, BTreeMap<Frame, f64>>) -> String {
-    published.iter().fold(text.to_owned(), |text, (name, values)| match values.get(&frame) {
-        Some(value) if text.contains('{') => text.replace(&format!("{{{name}}}"), &rounded(*value)),
-        _ => text,
-    })
+/// A text with the names of metrics in braces replaced by their values at a frame, and `{inputs:metric}` by the wire that the
+/// metric counts.
+fn filled(
+    text: &str,
+    frame: Frame,
+    published: &BTreeMap<&'static str, BTreeMap<Frame, f64>>,
+    wired: WireNames<'_>,
+) -> String {
+    let value = |name: &str| published.get(name)?.get(&frame).copied();
+    let meant = |name: &str| match name.split_once(':') {
+        Some((inputs, metric)) => wired(inputs, value(metric)? as usize),
+        None => value(name).map(rounded),
+    };
+    let mut parts = text.split('{');
+    let mut out = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        match part.split_once('}').and_then(|(name, rest)| Some((meant(name)?, rest))) {
+            Some((value, rest)) => out.extend([&value, rest]),
+            None => out.extend(["{", part]),
+        }
+    }
+    out
 }
 
 /// A number as a person reads it: whole, or with three digits.
@@ -69,21 +89,27 @@ mod tests {
     const MISSED: Metric = Metric::new("missed", Unit::None, "So far.").warn_last_above(1.0, "Come nearer.");
     const FAR: Metric = Metric::new("far", Unit::None, "Distance.").warn_always_above(1.0, "Come near.");
 
-    const IDLE: Metric = Metric::new("idle", Unit::None, "Idle.").warn_above(0.0, "The first is `pins` {wire}.");
+    const IDLE: Metric =
+        Metric::new("idle", Unit::None, "Idle.").warn_above(0.0, "The first is {pins:wire}, of {wire}.");
 
     #[test]
     fn a_warning_names_the_values_of_other_metrics() {
         let at = |values: [f64; 2]| values.into_iter().zip(1..).map(|(x, frame)| (Frame::whole(frame), x)).collect();
         let published = BTreeMap::from([("idle", at([0.0, 2.0])), ("wire", at([7.0, 3.0]))]);
-        let notes = notes(&"fur".into(), "Softbody", &[&IDLE], &published);
-        assert_eq!(notes[0].to_string(), "`fur` (Softbody): `idle` is 2 at frame 2. The first is `pins` 3.");
+        let wired = |input: &str, number: usize| Some(format!("`nail{number}` at `{input}`"));
+        let notes = notes(&"fur".into(), "Softbody", &[&IDLE], &published, &wired);
+        assert_eq!(
+            notes[0].to_string(),
+            "`fur` (Softbody): `idle` is 2 at frame 2. The first is `nail3` at `pins`, of 3."
+        );
     }
 
     fn shown(name: &'static str, values: &[f64]) -> Vec<String> {
         let frames: BTreeMap<Frame, f64> =
             values.iter().enumerate().map(|(frame, value)| (Frame::whole(frame as i64), *value)).collect();
         let published = BTreeMap::from([(name, frames)]);
-        let notes = notes(&"fur".into(), "Curve_Wind", &[&DEEP, &FREE, &RATIO, &FAR, &MISSED], &published);
+        let notes =
+            notes(&"fur".into(), "Curve_Wind", &[&DEEP, &FREE, &RATIO, &FAR, &MISSED], &published, &|_, _| None);
         notes.iter().map(Note::to_string).collect()
     }
 

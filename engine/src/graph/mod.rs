@@ -140,6 +140,16 @@ pub struct Graph {
 }
 
 impl Graph {
+    /// How a person finds a wire of a node: the node that it comes from and the input. `inputs`: those that it is counted
+    /// through, with `+` between them; `number`: from 0.
+    pub(crate) fn wire_name(&self, node: &GraphNode, inputs: &str, number: usize) -> Option<String> {
+        let Body::Node { node, inputs: wires, .. } = &node.body else { return None };
+        let of_input = |name: &str| node.inputs.iter().position(|input| input.spec().name == name);
+        let counted = inputs.split('+').filter_map(|name| Some((name, &wires[of_input(name)?])));
+        let (name, link) = counted.flat_map(|(name, links)| links.iter().map(move |link| (name, link))).nth(number)?;
+        Some(format!("`{}` at `{name}`", self.nodes[link.node].id))
+    }
+
     /// The files that the nodes may read. Of a sequence these are all that exist, whatever frames are cooked.
     pub fn files(&self) -> Vec<PathBuf> {
         let mut files = Vec::new();

@@ -28,7 +28,8 @@ pub struct Warning {
     /// The values that are worth one.
     pub when: Trouble,
     /// What it means and what to do about it; whole sentences. A name in braces, `{pin}`, is replaced by the value of
-    /// that metric of the node at the same frame.
+    /// that metric of the node at the same frame; `{pins:pin}` by the wire of that number at `pins`, `{a+b:wire}` counts
+    /// through several inputs.
     pub text: &'static str,
 }
 

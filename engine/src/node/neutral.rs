@@ -3,7 +3,7 @@
 
 use super::{Carries, Cook, Cx, FrameCx, LeftOut, Needs, Node, Outputs, Wires};
 use crate::error::{Error, Result};
-use crate::geometry::{Attr, Component, Owner};
+use crate::geometry::{Attr, Component, Item, Owner};
 use crate::param::Params;
 
 /// Why a node changes nothing with these params and wires; `None` where it may.
@@ -15,31 +15,48 @@ pub(crate) const WHOLE: &str = "all";
 /// An attribute that a node writes even where it is neutral: the same number in every row.
 #[derive(Clone, Copy, Debug)]
 pub struct Fill {
-    attribute: Attr<f32>,
-    value: f32,
+    number: Number,
     keep: bool,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Number {
+    Float(Attr<f32>, f32),
+    Int(Attr<i32>, i32),
 }
 
 impl Fill {
     /// `value` where the attribute is missing; what is there passes through.
     pub const fn missing(attribute: Attr<f32>, value: f32) -> Self {
-        Self { attribute, value, keep: true }
+        Self { number: Number::Float(attribute, value), keep: true }
     }
 
     /// `value` whether or not the attribute is there, as long as anyone takes it.
     pub const fn always(attribute: Attr<f32>, value: f32) -> Self {
-        Self { attribute, value, keep: false }
+        Self { number: Number::Float(attribute, value), keep: false }
+    }
+
+    /// As [`Fill::always`] for an integer.
+    pub const fn always_int(attribute: Attr<i32>, value: i32) -> Self {
+        Self { number: Number::Int(attribute, value), keep: false }
     }
 
     fn apply(&self, cx: &Cx, part: &mut Component) -> Result<()> {
-        let needed = if self.keep { part.get(self.attribute).is_none() } else { cx.wants(self.attribute) };
+        match self.number {
+            Number::Float(attribute, value) => self.fill(cx, part, attribute, value),
+            Number::Int(attribute, value) => self.fill(cx, part, attribute, value),
+        }
+    }
+
+    fn fill<T: Item>(&self, cx: &Cx, part: &mut Component, attribute: Attr<T>, value: T) -> Result<()> {
+        let needed = if self.keep { part.get(attribute).is_none() } else { cx.wants(attribute) };
         if needed {
-            let rows = match self.attribute.owner {
+            let rows = match attribute.owner {
                 Owner::Point => part.point_count(),
                 Owner::Element => part.element_count(),
                 Owner::Once => 1,
             };
-            part.set(self.attribute, vec![self.value; rows])?;
+            part.set(attribute, vec![value; rows])?;
         }
         Ok(())
     }

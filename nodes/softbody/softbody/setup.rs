@@ -286,6 +286,6 @@ fn skins(rest: &[[f64; 3]], triangles: &[[u32; 3]], parts: &[u32], links: &[[u32
     let part = |corners: &[u32; 3]| parts[corners[0] as usize];
     let mut sorted = triangles.to_vec();
     sorted.sort_by_key(part);
-    let skins = sorted.chunk_by(|a, b| part(a) == part(b)).map(|own| BodySkin::new(rest, own, links));
-    skins.map(|skin| skin.map_err(|error| Error::refused(format!("`bodies`: {error}")))).collect()
+    let surfaces: Vec<&[[u32; 3]]> = sorted.chunk_by(|a, b| part(a) == part(b)).collect();
+    BodySkin::several(rest, &surfaces, links).map_err(|error| Error::refused(format!("`bodies`: {error}")))
 }

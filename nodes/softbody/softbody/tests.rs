@@ -266,10 +266,10 @@ fn particles_that_start_inside_something_are_counted_at_every_frame() {
         frames[2].metrics["started_inside"]
     };
     let at = |low: [f32; 3]| inside(simulating(cube()).input(COLLIDERS, solid(low, 0.2)));
-    assert_eq!(at([0.03, -0.05, -0.05]), 17.0, "all but the nine particles on the face at x = 0");
+    assert_eq!(at([0.03, -0.05, -0.05]), 18.0, "all but the nine particles on the face at x = 0");
     assert_eq!((at([0.1, 0.0, 0.0]), at([0.0995, 0.0, 0.0])), (0.0, 0.0), "closer than `thickness` is touching");
     let mut open = solid([-0.05; 3], 0.2);
-    assert_eq!(inside(simulating(cube()).input(COLLIDERS, open.clone())), 26.0);
+    assert_eq!(inside(simulating(cube()).input(COLLIDERS, open.clone())), 27.0);
     let Topology::Mesh(faces) = open.topology() else { panic!("a mesh has faces") };
     open = Component::mesh(vec![3; 11], faces.corners[3..].to_vec(), open.positions().to_vec()).unwrap();
     assert_eq!(inside(simulating(cube()).input(COLLIDERS, open)), 0.0, "an open collider has no inside");
@@ -279,6 +279,31 @@ fn particles_that_start_inside_something_are_counted_at_every_frame() {
     // Of each, the four corners that lie in the other one, and what is between them.
     assert!((8.0..=20.0).contains(&inside(two(0.06))), "{}", inside(two(0.06)));
     assert_eq!((inside(two(0.2)), inside(two(0.06).set(BODY_COLLISION, false))), (0.0, 0.0));
+}
+
+#[test]
+fn how_well_a_body_carries_its_weight_is_published_where_something_holds_it_up() {
+    let ratio = |bench: Bench| bench.frames([1, 2])[1].metrics.get("stiffness_to_weight").copied();
+    let [exact, below] = [0.1, 0.2].map(|height| 5e3 / (1000.0 * G * height));
+    let same = |found: Option<f64>, exact: f64| found.is_some_and(|found| (found / exact - 1.0).abs() < 1e-6);
+    let ground = |bench: Bench| bench.set(GROUND, true);
+    assert!(same(ratio(ground(simulating(cube()))), exact));
+    let tall = block([1, 2, 1], [0.3, 0.0, 0.0], [0.1, 0.2, 0.1]);
+    assert!(same(ratio(ground(simulating(cube()).input(BODIES, tall))), below), "the one that carries it worst");
+    assert!(same(ratio(simulating(cube()).input(COLLIDERS, solid([0.0, -0.3, 0.0], 0.2))), exact));
+    assert_eq!(ratio(simulating(cube())), None, "it falls");
+    assert_eq!(ratio(ground(simulating(cube()).set(GRAVITY, [0.0; 3]))), None);
+}
+
+#[test]
+fn contacts_with_a_collider_that_leaves_no_room_above_the_ground_are_counted() {
+    let jammed = |foot: f32| {
+        let slab = block([2, 1, 2], [0.0; 3], [0.1, 0.0012, 0.1]);
+        let plate = solid([-0.05, foot, -0.05], 0.2);
+        simulating(slab).input(COLLIDERS, plate).set(GROUND, true).frames([1, 2])[1].metrics["jammed"]
+    };
+    assert!(jammed(0.0012) > 0.0);
+    assert_eq!(jammed(0.0022), 0.0, "2 `thickness` are left");
 }
 
 #[test]

@@ -86,3 +86,62 @@ fn any_offset_scale_is_finite_and_keeps_lengths() {
         assert_eq!(out.metrics["crossings_left"], 0.0, "{scale}");
     }
 }
+
+#[test]
+fn unfreed_counts_the_segments_of_each_curve_that_cross() {
+    // A box of 0.2 around the root of the first curve, whose segments are longer; the second one is outside.
+    let corner = |k: u32| [0, 1, 2].map(|axis| if k >> axis & 1 == 1 { 0.1 } else { -0.1 });
+    let faces = vec![0, 2, 3, 1, 4, 5, 7, 6, 0, 1, 5, 4, 2, 6, 7, 3, 0, 4, 6, 2, 1, 3, 7, 5];
+    let cube: Geometry = Component::mesh(vec![4; 6], faces, (0..8).map(corner).collect()).unwrap().into();
+    let curves = |along: [f32; 3]| -> Geometry {
+        let points = [0.0, 1.0, 2.0, 5.0, 6.0].map(|u| along.map(|x| x * u));
+        Component::curves(vec![3, 2], points.to_vec()).unwrap().into()
+    };
+    let scene = bench(&NODE).input(CURVES, curves([1.0, 0.0, 0.0])).input(REST, curves([0.0, 1.0, 0.0]));
+    let out = scene.input(COLLIDERS, cube).set(OFFSET_ROOT, 0.0).cook();
+    assert_eq!(out.curves().get(UNFREED_SEGMENTS), Some(&[1, 0][..]));
+    assert_eq!(
+        ["crossings_left", "unfreed_segments", "blended_to_rest"].map(|name| out.metrics[name]),
+        [1.0, 1.0, 0.0]
+    );
+    let out = laid_down().cook();
+    assert_eq!(out.curves().get(UNFREED_SEGMENTS), Some(&[0][..]));
+}
+
+#[test]
+fn roots_in_creases_are_lifted_from_both_faces_or_counted() {
+    // A groove along z, its faces this much to both sides as they rise by 1; the root lies on its edge.
+    for (side, low) in [(1.0, 0.0), (0.4, 0.0), (0.2, 1.0)] {
+        let points = vec![
+            [0.0, 0.0, -1.0],
+            [0.0, 0.0, 1.0],
+            [side, 1.0, -1.0],
+            [side, 1.0, 1.0],
+            [-side, 1.0, -1.0],
+            [-side, 1.0, 1.0],
+        ];
+        let groove: Geometry = Component::mesh(vec![4, 4], vec![0, 1, 3, 2, 0, 4, 5, 1], points).unwrap().into();
+        let upright = curve(&[[0.0, 0.0, 0.0], [0.0, 0.5, 0.0]]);
+        let scene = bench(&NODE).input(CURVES, upright.clone()).input(REST, upright).input(COLLIDERS, groove);
+        let out = scene.set(OFFSET_ROOT, 0.01).cook();
+        let height = f64::from(out.curves().positions()[0][1]);
+        let slope = f64::from(side);
+        let sine = slope / (1.0 + slope * slope).sqrt();
+        assert!((height - (0.01 / sine).min(0.04)).abs() < 2e-4, "{side}: {height}");
+        assert_eq!(out.metrics["low_roots"], low, "{side}");
+    }
+}
+
+#[test]
+fn loft_keeps_a_share_of_the_height_of_a_curve_blown_flat() {
+    let flat = || bench(&NODE).input(CURVES, curve(&[[0.0, 0.01, 0.0], [1.0, 0.01, 0.0]])).input(COLLIDERS, floor(0.0));
+    let blown = || flat().input(REST, curve(&[[0.0, 0.01, 0.0], [0.0, 1.01, 0.0]]));
+    for loft in [0.0, 0.1, 0.5] {
+        let out = blown().set(LOFT, loft).cook();
+        assert!((f64::from(out.curves().positions()[1][1]) - 0.01 - loft).abs() < 1e-6, "{loft}");
+    }
+    // `coherence` scales it, `offset_scale` replaces it.
+    let height = |bench: Bench| bench.cook().curves().positions()[1];
+    assert_eq!(height(blown().set(LOFT, 0.5).set(COHERENCE, 1.0)), height(blown().set(COHERENCE, 1.0)));
+    assert_eq!(height(blown().set(LOFT, 0.5).set(OFFSET_SCALE, 0.2)), height(blown().set(OFFSET_SCALE, 0.2)));
+}

@@ -159,9 +159,11 @@ impl Sweep<'_, '_, '_> {
 
     /// Notes metrics that exceed the limit their node declares.
     pub(super) fn note_warnings(&mut self) {
-        for (node, run) in self.plan.graph.nodes.iter().zip(&self.nodes) {
+        let graph = self.plan.graph;
+        for (node, run) in graph.nodes.iter().zip(&self.nodes) {
             let declared = node.node().map_or(&[][..], |declared| declared.metrics);
-            let notes = warnings::notes(&node.id, run.report.type_name, declared, &run.report.metrics);
+            let wired = |inputs: &str, number: usize| graph.wire_name(node, inputs, number);
+            let notes = warnings::notes(&node.id, run.report.type_name, declared, &run.report.metrics, &wired);
             self.report.notes.extend(notes);
         }
     }

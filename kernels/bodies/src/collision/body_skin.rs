@@ -5,6 +5,7 @@ use super::closest_point::{ClosestPoint, along};
 use super::obstacle::{check_points, check_triangles};
 use super::surface::{Edge, Moment, NONE, TriangleSurface};
 use super::swept::Elements;
+use std::collections::VecDeque;
 
 /// An edge longer than this many times its rest length and the skin's mean edge is released.
 const LONG: f64 = 8.0;
@@ -18,6 +19,8 @@ pub struct BodySkin {
     rest: Vec<[f64; 3]>,
     /// Mean rest length of the edges, metres.
     mean: f64,
+    /// Particles that meet the ground, obstacles and other skins, ascending: those of the surface and those within.
+    pub(super) touching: Vec<u32>,
     /// For each surface particle, those within two links, ascending.
     starts: Vec<u32>,
     rings: Vec<u32>,
@@ -30,27 +33,47 @@ impl BodySkin {
     /// # Errors
     /// If an index is out of range or a coordinate is not finite.
     pub fn new(rest: &[[f64; 3]], triangles: &[[u32; 3]], links: &[[u32; 2]]) -> Result<Self, CollisionError> {
-        check_triangles(rest.len(), triangles)?;
+        Self::several(rest, &[triangles], links).map(|mut skins| skins.swap_remove(0))
+    }
+
+    /// Skins of several bodies, which `links` may join. An inner particle belongs to the first skin from which a walk
+    /// along links reaches it.
+    ///
+    /// # Errors
+    /// As [`BodySkin::new`].
+    pub fn several(
+        rest: &[[f64; 3]],
+        surfaces: &[&[[u32; 3]]],
+        links: &[[u32; 2]],
+    ) -> Result<Vec<Self>, CollisionError> {
+        surfaces.iter().try_for_each(|triangles| check_triangles(rest.len(), triangles))?;
         check_points(rest)?;
         if let Some(index) = links.iter().position(|ends| ends.iter().any(|end| *end as usize >= rest.len())) {
             return Err(CollisionError::Link { index, ends: links[index], count: rest.len() });
         }
-        let surface = TriangleSurface::new(rest.len(), triangles);
-        let (starts, rings) = rings(&surface, rest.len(), links);
-        Ok(Self {
-            faces: Elements::new(surface.triangles.clone(), rest),
-            edges: Elements::new(surface.edges.iter().map(|edge| edge.ends).collect(), rest),
-            rest: rest.to_vec(),
-            mean: surface.edges.iter().map(|edge| edge_length(edge, rest)).sum::<f64>()
-                / surface.edges.len().max(1) as f64,
-            surface,
-            starts,
-            rings,
-        })
+        let surfaces: Vec<_> = surfaces.iter().map(|triangles| TriangleSurface::new(rest.len(), triangles)).collect();
+        let edges = surfaces.iter().flat_map(|surface| &surface.edges).map(|edge| edge.ends);
+        let neighbours = Neighbours::new(rest.len(), links.iter().copied().chain(edges));
+        let touching = touching(&surfaces, &neighbours, rest.len());
+        let skin = |(surface, touching): (TriangleSurface, Vec<u32>)| {
+            let (starts, rings) = rings(&surface, &neighbours, rest.len());
+            Self {
+                faces: Elements::new(surface.triangles.clone(), rest),
+                edges: Elements::new(surface.edges.iter().map(|edge| edge.ends).collect(), rest),
+                rest: rest.to_vec(),
+                mean: surface.edges.iter().map(|edge| edge_length(edge, rest)).sum::<f64>()
+                    / surface.edges.len().max(1) as f64,
+                surface,
+                touching,
+                starts,
+                rings,
+            }
+        };
+        Ok(surfaces.into_iter().zip(touching).map(skin).collect())
     }
 
     /// Number of particles of the body, interior ones included.
-    pub(super) fn particles(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.rest.len()
     }
 
@@ -72,7 +95,8 @@ impl BodySkin {
         if !edges.contains(&true) {
             return ReleasedElements::default();
         }
-        let (mut faces, mut particles) = (vec![false; surface.triangles.len()], vec![true; self.rest.len()]);
+        let (mut faces, mut particles) = (vec![false; surface.triangles.len()], vec![false; self.rest.len()]);
+        surface.vertices.iter().for_each(|vertex| particles[*vertex as usize] = true);
         for (edge, released) in surface.edges.iter().zip(&edges) {
             if *released {
                 edge.faces.iter().filter(|face| **face != NONE).for_each(|face| faces[*face as usize] = true);
@@ -111,7 +135,7 @@ pub(super) struct ReleasedElements {
     edges: Vec<bool>,
     /// Whether each triangle has a released edge.
     faces: Vec<bool>,
-    /// Whether all edges of a particle are released.
+    /// Whether all edges of a surface particle are released.
     particles: Vec<bool>,
 }
 
@@ -134,28 +158,61 @@ fn edge_length(edge: &Edge, places: &[[f64; 3]]) -> f64 {
     (at.position(edge.ends[0]) - at.position(edge.ends[1])).norm()
 }
 
+/// The particles that share a link or an edge with each particle.
+struct Neighbours {
+    starts: Vec<u32>,
+    pairs: Vec<[u32; 2]>,
+}
+
+impl Neighbours {
+    fn new(count: usize, links: impl Iterator<Item = [u32; 2]>) -> Self {
+        let mut pairs: Vec<[u32; 2]> = links.flat_map(|[a, b]| [[a, b], [b, a]]).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        let mut starts = vec![0; count + 1];
+        pairs.iter().for_each(|pair| starts[pair[0] as usize + 1] += 1);
+        for particle in 0..count {
+            starts[particle + 1] += starts[particle];
+        }
+        Self { starts, pairs }
+    }
+
+    fn of(&self, particle: u32) -> impl Iterator<Item = u32> {
+        let range = self.starts[particle as usize] as usize..self.starts[particle as usize + 1] as usize;
+        self.pairs[range].iter().map(|pair| pair[1])
+    }
+}
+
+/// The particles of each surface and those within, ascending: a walk from all surfaces at once gives each particle to
+/// the first that reaches it.
+fn touching(surfaces: &[TriangleSurface], neighbours: &Neighbours, count: usize) -> Vec<Vec<u32>> {
+    let mut skin_of = vec![NONE; count];
+    let mut queue = VecDeque::new();
+    for (skin, surface) in (0..).zip(surfaces) {
+        queue.extend(surface.vertices.iter().map(|vertex| (*vertex, skin)));
+    }
+    while let Some((particle, skin)) = queue.pop_front() {
+        if skin_of[particle as usize] == NONE {
+            skin_of[particle as usize] = skin;
+            queue.extend(neighbours.of(particle).map(|other| (other, skin)));
+        }
+    }
+    let mut touching = vec![Vec::new(); surfaces.len()];
+    for (particle, skin) in (0..).zip(skin_of).filter(|(_, skin)| *skin != NONE) {
+        touching[skin as usize].push(particle);
+    }
+    touching
+}
+
 /// For each surface particle, the surface particles within two links of it.
-fn rings(surface: &TriangleSurface, count: usize, links: &[[u32; 2]]) -> (Vec<u32>, Vec<u32>) {
-    let mut pairs: Vec<[u32; 2]> = links.iter().copied().chain(surface.edges.iter().map(|edge| edge.ends)).collect();
-    pairs.extend(pairs.clone().into_iter().map(|[a, b]| [b, a]));
-    pairs.sort_unstable();
-    pairs.dedup();
-    let mut first = vec![0; count + 1];
-    for pair in &pairs {
-        first[pair[0] as usize + 1] += 1;
-    }
-    for particle in 0..count {
-        first[particle + 1] += first[particle];
-    }
-    let near = |particle: u32| pairs[first[particle as usize]..first[particle as usize + 1]].iter().map(|pair| pair[1]);
+fn rings(surface: &TriangleSurface, neighbours: &Neighbours, count: usize) -> (Vec<u32>, Vec<u32>) {
     let mut outer = vec![false; count];
     surface.vertices.iter().for_each(|vertex| outer[*vertex as usize] = true);
     let (mut starts, mut rings) = (vec![0], Vec::new());
     for particle in 0..count as u32 {
         if outer[particle as usize] {
-            let mut ring: Vec<u32> = near(particle).flat_map(|next| near(next).chain([next])).collect();
-            ring.push(particle);
-            ring.retain(|other| outer[*other as usize]);
+            let near = neighbours.of(particle).flat_map(|next| neighbours.of(next).chain([next]));
+            let mut ring: Vec<u32> = near.chain([particle]).filter(|other| outer[*other as usize]).collect();
             ring.sort_unstable();
             ring.dedup();
             rings.extend(ring);

@@ -10,7 +10,7 @@ impl CollisionScene<'_> {
     /// Obstacles that are open or face inwards have no inside.
     pub fn count_inside(&self, x: &[[f64; 3]]) -> usize {
         let mut inside = vec![false; x.len()];
-        let skins: Vec<&[u32]> = self.skins.iter().map(|skin| &skin.surface.vertices[..]).collect();
+        let skins: Vec<&[u32]> = self.skins.iter().map(|skin| &skin.touching[..]).collect();
         if let Some(ground) = self.ground {
             for particle in skins.iter().copied().flatten() {
                 let height = DVec3::from(x[*particle as usize]).dot(&DVec3::from(ground.up)) - ground.height;

@@ -36,7 +36,7 @@ use numerics::vector::{DVec3, to_f32};
 pub use obstacle::{Ground, Obstacle};
 pub use pair::ContactParams;
 use std::sync::{Mutex, OnceLock};
-use surface::{Moment, Positions};
+use surface::Positions;
 use swept::BoxTree;
 use vertex::{ContactRules, MovingSurface};
 
@@ -48,6 +48,9 @@ const POINTS: usize = 1024;
 const REACH: f64 = 2.0;
 /// Largest deviation of a rotating obstacle from linear motion between sampled poses, as a fraction of the gap.
 const SAG: f64 = 0.25;
+
+/// Distance along its normal, in gaps, by which an obstacle has to be raised above the ground to leave no room.
+const JAMMED: f64 = 0.5;
 
 /// Why contact detection could not be set up.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -123,66 +126,33 @@ pub struct CollisionScene<'a> {
     pub self_contact: Option<ContactParams>,
 }
 
-/// Summary of a search.
-#[must_use]
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ContactSummary {
-    /// Number of contacts.
-    pub contacts: u32,
-    /// Largest depth below the gap at the start of the motion, along the normal at its end, metres.
-    pub deepest_overlap: f64,
-}
-
 impl ContactFinder for CollisionScene<'_> {
+    /// The order is: ground contacts by particle; those of each obstacle by particle, then by its own points, then by
+    /// edges; then pairs of bodies; then self-contacts.
     fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
-        let _ = self.search(query, out);
-    }
-}
-
-/// A contact, and its offset at the start of the motion.
-#[derive(Clone, Copy, Debug)]
-struct FoundContact {
-    contact: Contact,
-    /// n·u at which the surfaces touch at the start.
-    start: f64,
-}
-
-impl CollisionScene<'_> {
-    /// As [`ContactFinder::find`], with a summary. The order is: ground contacts by particle; those of each obstacle
-    /// by particle, then by its own points, then by edges; then pairs of bodies; then self-contacts.
-    pub fn search(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) -> ContactSummary {
-        let mut seen = Vec::new();
-        self.on_ground(query, &mut seen);
+        self.on_ground(query, out);
         let boxes = swept::swept_boxes(&[query.from, query.to]);
         if !self.obstacles.is_empty() {
             for skin in self.skins {
                 let faces = skin.faces.sweep(&boxes, 0.0);
                 let released = skin.released(query.from);
                 for obstacle in self.obstacles {
-                    self.against_obstacle(query, (skin, &released), &boxes, &faces, obstacle, &mut seen);
+                    self.against_obstacle(query, (skin, &released), &boxes, &faces, obstacle, out);
                 }
             }
         }
-        self.pairs(query, &boxes, &mut seen);
-        let mut found = ContactSummary { contacts: seen.len() as u32, deepest_overlap: 0.0 };
-        for FoundContact { contact, start } in &seen {
-            let sides = contact.particles.iter().zip(contact.weights).filter(|side| side.1 != 0.0);
-            let apart: DVec3 =
-                sides.map(|(particle, weight)| DVec3::from(query.from[*particle as usize]) * weight).sum();
-            let height = DVec3::from(contact.normal).dot(&apart) - start;
-            found.deepest_overlap = found.deepest_overlap.max(contact.gap - height);
-        }
-        out.extend(seen.iter().map(|seen| seen.contact));
-        found
+        self.pairs(query, &boxes, out);
     }
+}
 
-    fn on_ground(&self, query: &ContactQuery<'_>, out: &mut Vec<FoundContact>) {
+impl CollisionScene<'_> {
+    fn on_ground(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
         let Some(ground) = self.ground else { return };
         let up = DVec3::from(ground.up);
-        for particle in self.skins.iter().flat_map(|skin| &skin.surface.vertices) {
+        for particle in self.skins.iter().flat_map(|skin| &skin.touching) {
             let height = |x: &[[f64; 3]]| up.dot(&DVec3::from(x[*particle as usize])) - ground.height;
             if height(query.from).min(height(query.to)) <= REACH * ground.thickness {
-                let contact = Contact {
+                out.push(Contact {
                     particles: [*particle, 0, 0, 0],
                     weights: [1.0, 0.0, 0.0, 0.0],
                     normal: ground.up,
@@ -190,8 +160,8 @@ impl CollisionScene<'_> {
                     gap: ground.thickness,
                     velocity: [0.0; 3],
                     friction: ground.friction * self.friction_scale(&[*particle], &[1.0]),
-                };
-                out.push(FoundContact { contact, start: ground.height });
+                    jammed: false,
+                });
             }
         }
     }
@@ -217,7 +187,7 @@ impl CollisionScene<'_> {
         boxes: &[Cuboid],
         faces: &BoxTree<'_>,
         obstacle: &Obstacle,
-        out: &mut Vec<FoundContact>,
+        out: &mut Vec<Contact>,
     ) {
         let rules = ContactRules { gap: obstacle.thickness, reach: REACH * obstacle.thickness, push: true };
         let times = obstacle.motion.times(query.times, SAG * obstacle.thickness);
@@ -225,7 +195,7 @@ impl CollisionScene<'_> {
         let obstacle_poses: Vec<Positions<'_>> = obstacle_poses.iter().map(Vec::as_slice).collect();
         let still_boxes = swept::swept_boxes(&obstacle_poses);
         let tree = obstacle.faces.sweep(&still_boxes, rules.reach);
-        if !swept::overlap(&faces.bounds, &tree.bounds) {
+        if !swept::overlap(&swept::bounds_of_finite(&skin.touching, boxes), &tree.bounds) {
             return;
         }
         let between = poses_between(query, &times);
@@ -243,7 +213,7 @@ impl CollisionScene<'_> {
             still: MovingSurface { surface: &obstacle.surface, poses: &obstacle_poses },
             rules,
         };
-        meeting.vertices(&tree, out);
+        meeting.particles(&tree, out);
         meeting.points(faces, out);
         meeting.edges(out);
     }
@@ -276,10 +246,10 @@ struct SkinObstaclePair<'a> {
 }
 
 /// Adds the contacts of some things to a list, with buffers that another task may have used before.
-type FindIn<'a, S> = dyn Fn(&mut S, &[u32], &mut Vec<FoundContact>) + Sync + 'a;
+type FindIn<'a, S> = dyn Fn(&mut S, &[u32], &mut Vec<Contact>) + Sync + 'a;
 
 /// Collects the contacts of `things` in their order, for any number of threads.
-fn collect_in_order<S: Default + Send>(things: &[u32], find_in: &FindIn<'_, S>, out: &mut Vec<FoundContact>) {
+fn collect_in_order<S: Default + Send>(things: &[u32], find_in: &FindIn<'_, S>, out: &mut Vec<Contact>) {
     let unused: Mutex<Vec<S>> = Mutex::default();
     let lock = || unused.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let parts = parallel::map(things.chunks(TASK), |_, things| {
@@ -298,35 +268,35 @@ fn path_of(poses: &[Positions<'_>], point: u32, path: &mut Vec<DVec3>) {
 }
 
 impl SkinObstaclePair<'_> {
-    /// Vertices of the skin against triangles of the obstacle.
-    fn vertices(&self, tree: &BoxTree<'_>, out: &mut Vec<FoundContact>) {
-        // A vertex may be inside anywhere within the bounds; only closed obstacles have an inside.
+    /// Particles of the skin against triangles of the obstacle.
+    fn particles(&self, tree: &BoxTree<'_>, out: &mut Vec<Contact>) {
+        // A particle may be inside anywhere within the bounds; only closed obstacles have an inside.
         let (solid, bounds) = (OnceLock::new(), tree.bounds);
         let has_inside = self.obstacle.surface.closed;
-        let find_in = |(): &mut (), vertices: &[u32], out: &mut Vec<FoundContact>| {
+        let find_in = |(): &mut (), particles: &[u32], out: &mut Vec<Contact>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
-            for vertex in vertices.iter().filter(|vertex| !self.released.has_particle(**vertex)) {
-                tree.overlapping(&self.boxes[0][*vertex as usize], &mut faces);
-                let own = &self.boxes[0][*vertex as usize];
+            for particle in particles.iter().filter(|particle| !self.released.has_particle(**particle)) {
+                tree.overlapping(&self.boxes[0][*particle as usize], &mut faces);
+                let own = &self.boxes[0][*particle as usize];
                 if faces.is_empty() && !(has_inside && swept::overlap(own, &bounds)) {
                     continue;
                 }
-                path_of(self.body.poses, *vertex, &mut path);
+                path_of(self.body.poses, *particle, &mut path);
                 let start = path[0];
                 hits.clear();
                 let closest_at_start = || self.closest_at_start(&solid, &bounds, start);
                 vertex::hits(&path, &self.still, &faces, &closest_at_start, &self.rules, &mut hits);
                 for hit in &hits {
                     let corners = self.obstacle.surface.triangles[hit.face as usize];
-                    let first = ([*vertex, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]);
-                    out.extend(self.contact(first, (&corners, &hit.weights), hit.normal, hit.shift));
+                    let first = ([*particle, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]);
+                    out.push(self.contact(first, (&corners, &hit.weights), hit.normal, hit.shift));
                 }
             }
         };
-        collect_in_order(&self.skin.surface.vertices, &find_in, out);
+        collect_in_order(&self.skin.touching, &find_in, out);
     }
 
-    /// The closest triangle at the start of the motion, for a vertex within the `bounds` of the obstacle; `solid`
+    /// The closest triangle at the start of the motion, for a particle within the `bounds` of the obstacle; `solid`
     /// holds its triangles at that time, built on first use.
     fn closest_at_start(&self, solid: &OnceLock<TriangleTree>, bounds: &Cuboid, start: DVec3) -> Option<ClosestPoint> {
         let p = to_f32(start);
@@ -343,8 +313,8 @@ impl SkinObstaclePair<'_> {
     }
 
     /// Sharp points of the obstacle against triangles of the skin.
-    fn points(&self, tree: &BoxTree<'_>, out: &mut Vec<FoundContact>) {
-        let find_in = |(): &mut (), points: &[u32], out: &mut Vec<FoundContact>| {
+    fn points(&self, tree: &BoxTree<'_>, out: &mut Vec<Contact>) {
+        let find_in = |(): &mut (), points: &[u32], out: &mut Vec<Contact>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
             for point in points {
                 let region = swept::inflated(&self.boxes[1][*point as usize], self.rules.reach);
@@ -360,7 +330,7 @@ impl SkinObstaclePair<'_> {
                     let [a, b, c] = self.skin.surface.triangles[hit.face as usize];
                     let [u, v, w] = hit.weights;
                     let first = ([a, b, c, 0], [u, v, w, 0.0]);
-                    out.extend(self.contact(first, (&[*point], &[1.0]), -hit.normal, hit.shift));
+                    out.push(self.contact(first, (&[*point], &[1.0]), -hit.normal, hit.shift));
                 }
             }
         };
@@ -368,10 +338,10 @@ impl SkinObstaclePair<'_> {
     }
 
     /// Edges of the skin against sharp edges of the obstacle.
-    fn edges(&self, out: &mut Vec<FoundContact>) {
+    fn edges(&self, out: &mut Vec<Contact>) {
         let tree = self.obstacle.edges.sweep(self.boxes[1], self.rules.reach);
         let indices: Vec<u32> = (0..self.skin.surface.edges.len() as u32).collect();
-        let find_in = |(): &mut (), edges: &[u32], out: &mut Vec<FoundContact>| {
+        let find_in = |(): &mut (), edges: &[u32], out: &mut Vec<Contact>| {
             let mut others = Vec::new();
             for index in edges.iter().filter(|edge| !self.released.has_edge(**edge)) {
                 let edge = &self.skin.surface.edges[*index as usize];
@@ -381,7 +351,7 @@ impl SkinObstaclePair<'_> {
                     if let Some(hit) = edge::hit(&self.body, edge, &self.still, other, &self.rules) {
                         let [s, t] = hit.shares;
                         let first = ([edge.ends[0], edge.ends[1], 0, 0], [1.0 - s, s, 0.0, 0.0]);
-                        out.extend(self.contact(first, (&other.ends, &[1.0 - t, t]), hit.normal, 0.0));
+                        out.push(self.contact(first, (&other.ends, &[1.0 - t, t]), hit.normal, 0.0));
                     }
                 }
             }
@@ -389,45 +359,41 @@ impl SkinObstaclePair<'_> {
         collect_in_order(&indices, &find_in, out);
     }
 
-    /// A contact of particles with points of the obstacle; `None` if it would only push into the ground.
+    /// A contact of particles with points of the obstacle, which counts as stopped above the ground.
     fn contact(
         &self,
         (particles, weights): ([u32; 4], [f64; 4]),
         (points, shares): (&[u32], &[f64]),
         normal: DVec3,
         shift: f64,
-    ) -> Option<FoundContact> {
-        let touched =
-            |at: &Moment<'_>| points.iter().zip(shares).map(|(point, share)| at.position(*point) * *share).sum();
-        let (start, end): (DVec3, DVec3) = (touched(&self.still.start()), touched(&self.still.end()));
-        let gap = self.rules.gap;
-        let normal = self.scene.above_ground(normal, end, gap)?;
-        let contact = Contact {
+    ) -> Contact {
+        let (gap, times) = (self.rules.gap, self.query.times);
+        let [(_, raised), (end, raised_end)] = [self.still.start(), self.still.end()].map(|at| {
+            let touched = points.iter().zip(shares).map(|(point, share)| at.position(*point) * *share).sum();
+            (touched, self.scene.raised(touched, normal, gap))
+        });
+        let seconds = self.obstacle.seconds * (times[1] - times[0]);
+        let stopping = if seconds > 0.0 { (raised_end - raised) / seconds } else { DVec3::zeros() };
+        Contact {
             particles,
             weights,
             normal: normal.into(),
-            offset: normal.dot(&end) - shift,
+            offset: normal.dot(&(end + raised_end)) - shift,
             gap,
-            velocity: self.obstacle.velocity_of(self.query.times[1], points, shares).into(),
+            velocity: (self.obstacle.velocity_of(times[1], points, shares) + stopping).into(),
             friction: self.obstacle.friction * self.scene.friction_scale(&particles, &weights),
-        };
-        Some(FoundContact { contact, start: normal.dot(&start) })
+            jammed: -normal.dot(&raised_end) > JAMMED * gap,
+        }
     }
 }
 
 impl CollisionScene<'_> {
-    /// The normal, without its downward part if it would push `point` below the ground; `None` if nothing remains.
-    fn above_ground(&self, normal: DVec3, point: DVec3, gap: f64) -> Option<DVec3> {
-        /// Smallest remaining length, above the rounding of a normal straight down.
-        const LEFT: f64 = 1e-3;
-        let Some(ground) = self.ground else { return Some(normal) };
+    /// How far an obstacle has to be raised at `point` so that it does not push along `normal` below the ground.
+    fn raised(&self, point: DVec3, normal: DVec3, gap: f64) -> DVec3 {
+        let Some(ground) = self.ground else { return DVec3::zeros() };
         let up = DVec3::from(ground.up);
-        let down = -normal.dot(&up);
         let pushed = (point + normal * gap).dot(&up) - ground.height;
-        if down <= 0.0 || pushed >= ground.thickness {
-            return Some(normal);
-        }
-        (normal + up * down).try_normalize(LEFT)
+        if normal.dot(&up) < 0.0 { up * (ground.thickness - pushed).max(0.0) } else { DVec3::zeros() }
     }
 }
 

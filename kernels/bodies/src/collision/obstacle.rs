@@ -21,7 +21,7 @@ pub struct Obstacle {
     /// Its triangles, for closest-point queries.
     pub(super) solid: TriangleTree,
     /// Length of the frame, seconds.
-    seconds: f64,
+    pub(super) seconds: f64,
     /// Distance to keep from it, metres.
     pub(super) thickness: f64,
     /// Coulomb's friction coefficient μ.

@@ -4,7 +4,7 @@ use super::body_skin::BodySkin;
 use super::edge;
 use super::swept::{self, BoxTree};
 use super::vertex::{self, ContactRules, MovingSurface};
-use super::{CollisionScene, FoundContact, REACH, collect_in_order};
+use super::{CollisionScene, REACH, collect_in_order};
 use crate::mass_spring::{Contact, ContactQuery};
 use numerics::tree::Cuboid;
 use numerics::vector::DVec3;
@@ -44,7 +44,7 @@ struct Marks {
 impl Marks {
     fn put(&mut self, skin: &BodySkin, particles: &[u32]) {
         if self.of.is_empty() || self.last == u32::MAX {
-            self.of = vec![0; skin.particles()];
+            self.of = vec![0; skin.len()];
             self.last = 0;
         }
         self.last += 1;
@@ -60,16 +60,22 @@ impl Marks {
 
 /// Swept boxes of a skin.
 struct Boxes<'a> {
+    /// Bounds of all its particles.
+    bounds: Cuboid,
     faces: BoxTree<'a>,
     edges: BoxTree<'a>,
 }
 
 impl CollisionScene<'_> {
     /// All pairs of skins, then each skin with itself.
-    pub(super) fn pairs(&self, query: &ContactQuery<'_>, points: &[Cuboid], out: &mut Vec<FoundContact>) {
+    pub(super) fn pairs(&self, query: &ContactQuery<'_>, points: &[Cuboid], out: &mut Vec<Contact>) {
         let boxes = |reach: f64| -> Vec<Boxes<'_>> {
-            let faces = self.skins.iter().map(|skin| skin.faces.sweep(points, reach));
-            faces.zip(self.skins).map(|(faces, skin)| Boxes { faces, edges: skin.edges.sweep(points, reach) }).collect()
+            let of = self.skins.iter().map(|skin| Boxes {
+                bounds: swept::inflated(&swept::bounds_of_finite(&skin.touching, points), reach),
+                faces: skin.faces.sweep(points, reach),
+                edges: skin.edges.sweep(points, reach),
+            });
+            of.collect()
         };
         let pair = |skins: [usize; 2], self_contact: bool, params: ContactParams| Pair {
             scene: self,
@@ -84,9 +90,9 @@ impl CollisionScene<'_> {
             let boxes = boxes(REACH * params.thickness);
             for second in 1..self.skins.len() {
                 for first in 0..second {
-                    if swept::overlap(&boxes[first].faces.bounds, &boxes[second].faces.bounds) {
-                        pair([first, second], false, params).vertices(&boxes[second], out);
-                        pair([second, first], false, params).vertices(&boxes[first], out);
+                    if swept::overlap(&boxes[first].bounds, &boxes[second].bounds) {
+                        pair([first, second], false, params).particles(&boxes[second], out);
+                        pair([second, first], false, params).particles(&boxes[first], out);
                         pair([first, second], false, params).edges(&boxes[second], out);
                     }
                 }
@@ -95,7 +101,7 @@ impl CollisionScene<'_> {
         if let Some(params) = self.self_contact {
             for (skin, boxes) in boxes(REACH * params.thickness).iter().enumerate() {
                 let pair = pair([skin, skin], true, params);
-                pair.vertices(boxes, out);
+                pair.particles(boxes, out);
                 pair.edges(boxes, out);
             }
         }
@@ -103,43 +109,44 @@ impl CollisionScene<'_> {
 }
 
 impl Pair<'_> {
-    /// Vertices of the first skin against triangles of the second.
-    fn vertices(&self, boxes: &Boxes<'_>, out: &mut Vec<FoundContact>) {
+    /// Particles of the first skin against triangles of the second; of the same skin only those of its surface.
+    fn particles(&self, boxes: &Boxes<'_>, out: &mut Vec<Contact>) {
         let poses = [self.query.from, self.query.to];
         let [first, second] = self.skins;
         let on = MovingSurface { surface: &second.surface, poses: &poses };
-        let find_in = |marks: &mut Marks, vertices: &[u32], out: &mut Vec<FoundContact>| {
+        let find_in = |marks: &mut Marks, particles: &[u32], out: &mut Vec<Contact>| {
             let (mut faces, mut hits) = (Vec::new(), Vec::new());
-            for vertex in vertices {
-                boxes.faces.overlapping(&self.points[*vertex as usize], &mut faces);
+            for particle in particles {
+                boxes.faces.overlapping(&self.points[*particle as usize], &mut faces);
                 if self.self_contact {
-                    marks.put(first, &[*vertex]);
+                    marks.put(first, &[*particle]);
                     faces.retain(|face| !marks.have(&first.surface.triangles[*face as usize]));
                 }
                 if faces.is_empty() {
                     continue;
                 }
                 hits.clear();
-                let path = poses.map(|pose| DVec3::from(pose[*vertex as usize]));
+                let path = poses.map(|pose| DVec3::from(pose[*particle as usize]));
                 vertex::hits(&path, &on, &faces, &|| None, &self.rules, &mut hits);
                 for hit in &hits {
                     let [a, b, c] = second.surface.triangles[hit.face as usize];
                     let [u, v, w] = hit.weights;
-                    let gap = self.gap(|| first.rest_to_face(*vertex, hit.face));
-                    out.extend(self.contact([*vertex, a, b, c], [1.0, -u, -v, -w], hit.normal, hit.shift, gap));
+                    let gap = self.gap(|| first.rest_to_face(*particle, hit.face));
+                    out.extend(self.contact([*particle, a, b, c], [1.0, -u, -v, -w], hit.normal, hit.shift, gap));
                 }
             }
         };
-        collect_in_order(&first.surface.vertices, &find_in, out);
+        let particles = if self.self_contact { &first.surface.vertices } else { &first.touching };
+        collect_in_order(particles, &find_in, out);
     }
 
     /// Edges of the first skin against those of the second.
-    fn edges(&self, boxes: &Boxes<'_>, out: &mut Vec<FoundContact>) {
+    fn edges(&self, boxes: &Boxes<'_>, out: &mut Vec<Contact>) {
         let poses = [self.query.from, self.query.to];
         let [first, second] = self.skins;
         let [one, two] = [first, second].map(|skin| MovingSurface { surface: &skin.surface, poses: &poses });
         let indices: Vec<u32> = (0..first.surface.edges.len() as u32).collect();
-        let find_in = |marks: &mut Marks, edges: &[u32], out: &mut Vec<FoundContact>| {
+        let find_in = |marks: &mut Marks, edges: &[u32], out: &mut Vec<Contact>| {
             let mut others = Vec::new();
             for index in edges {
                 let edge = &first.surface.edges[*index as usize];
@@ -167,18 +174,11 @@ impl Pair<'_> {
         if self.self_contact { self.params.thickness.min(at_rest()) } else { self.params.thickness }
     }
 
-    fn contact(
-        &self,
-        particles: [u32; 4],
-        weights: [f64; 4],
-        normal: DVec3,
-        shift: f64,
-        gap: f64,
-    ) -> Option<FoundContact> {
+    fn contact(&self, particles: [u32; 4], weights: [f64; 4], normal: DVec3, shift: f64, gap: f64) -> Option<Contact> {
         if gap < JOINED * self.params.thickness {
             return None;
         }
-        let contact = Contact {
+        Some(Contact {
             particles,
             weights,
             normal: normal.into(),
@@ -186,7 +186,7 @@ impl Pair<'_> {
             gap,
             velocity: [0.0; 3],
             friction: self.params.friction * self.scene.friction_scale(&particles, &weights),
-        };
-        Some(FoundContact { contact, start: 0.0 })
+            jammed: false,
+        })
     }
 }

@@ -120,6 +120,12 @@ pub(super) fn bounds_of(points: &[u32], boxes: &[Cuboid]) -> Cuboid {
     points[1..].iter().fold(first, |all, point| join(&all, &boxes[*point as usize]))
 }
 
+/// Bounds of the boxes of those points that are finite.
+pub(super) fn bounds_of_finite(points: &[u32], boxes: &[Cuboid]) -> Cuboid {
+    let own = points.iter().map(|point| &boxes[*point as usize]).filter(|own| !own.low[0].is_nan());
+    own.fold(NOWHERE, |all, own| join(&all, own))
+}
+
 /// A box inflated by `reach` on every side.
 #[inline]
 pub(super) fn inflated(a: &Cuboid, reach: f64) -> Cuboid {

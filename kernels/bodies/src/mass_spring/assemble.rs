@@ -145,11 +145,11 @@ impl StageSolver {
                 let mut own = context.external.force(particle, mass, stage.time, x[particle], v[particle]);
                 if !regions.is_empty() {
                     own -= regions.gather(particle, &solver.volumes.pressures, &solver.volumes.gradients);
-                    regions.add_block(particle, OVERLAP, &mut block);
+                    regions.add_block(particle, OVERLAP, usize::MAX, &mut block);
                 }
                 own += solver.transient_forces.get(particle).copied().unwrap_or_default();
                 if !transient.is_empty() {
-                    transient.add_block(particle, 1.0, &mut block);
+                    transient.add_block(particle, 1.0, usize::MAX, &mut block);
                 }
                 if let Some(other) = blocks.get(particle) {
                     block.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
@@ -201,6 +201,7 @@ impl StageSolver {
             self.system.regions.set(&weights, &self.volumes.gradients, clusters);
         }
         self.system.blocks.clear();
+        self.system.anchors = self.thin_tets.len();
         let (mut starts, mut particles, mut along) = (vec![0u32], Vec::new(), Vec::new());
         for thin in &self.thin_tets {
             let root = (a * a * thin.stiffness).sqrt();
@@ -208,8 +209,12 @@ impl StageSolver {
             along.extend(thin.gradient.iter().map(|g| g * root));
             starts.push(particles.len() as u32);
         }
-        let known = stage.contacts.iter().zip(&self.contact_states).zip(&self.friction_duals);
-        for ((contact, state), dual) in known.filter(|known| known.0.1.mode != ContactMode::Open) {
+        let known = || stage.contacts.iter().zip(&self.contact_states).zip(&self.friction_duals);
+        let grouped = [false, true].into_iter().flat_map(|two_sided| known().map(move |known| (two_sided, known)));
+        for (two_sided, ((contact, state), dual)) in grouped {
+            if state.mode == ContactMode::Open || contact.is_two_sided() != two_sided {
+                continue;
+            }
             let resisted = contact.stiffness_directions(state, a, dual);
             if let Some((particle, weight)) = contact.single_particle() {
                 if self.system.blocks.is_empty() {
@@ -226,6 +231,7 @@ impl StageSolver {
                 }
                 starts.push(particles.len() as u32);
             }
+            self.system.anchors = if two_sided { self.system.anchors } else { starts.len() - 1 };
         }
         let partition = Partition::even(starts.len() - 1, 512, 1);
         let transient: &mut RankOneTerms = &mut self.system.transient;

@@ -226,6 +226,25 @@ impl SoftBody {
         self.size
     }
 
+    /// E ÷ (ρgh) of the piece that carries its own weight worst, with h its height at rest along `gravity`, m/s²;
+    /// infinite without weight.
+    pub fn stiffness_to_weight(&self, gravity: [f64; 3]) -> f64 {
+        let gravity = DVec3::from(gravity);
+        let mut stiff = vec![0.0; self.len()];
+        for ((tet, volume), modulus) in self.tets.iter().zip(&self.volumes).zip(&self.moduli) {
+            stiff[tet[0] as usize] += volume * modulus;
+        }
+        let ratio = |piece: &std::ops::Range<usize>| {
+            let particles = self.particles(piece);
+            let mass: f64 = self.mass[particles.clone()].iter().sum();
+            let along = self.rest[particles.clone()].iter().map(|x| gravity.dot(x));
+            let (low, high) =
+                along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+            stiff[particles].iter().sum::<f64>() / (mass * (high - low))
+        };
+        self.order.pieces.iter().map(ratio).fold(f64::INFINITY, f64::min)
+    }
+
     /// The particles of a piece.
     pub(super) fn particles(&self, piece: &std::ops::Range<usize>) -> std::ops::Range<usize> {
         let clusters = &self.order.clusters;

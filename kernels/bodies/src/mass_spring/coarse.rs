@@ -5,6 +5,7 @@
 //! factor's envelope narrow; for a thousand separate small bodies it is block-diagonal.
 
 use super::body::SoftBody;
+use super::galerkin::envelope;
 use super::partition::Partition;
 use super::system::{System, solve_lower, solve_lower_transpose, times};
 use numerics::vector::{DMat3, DVec3, Vec3, to_f32};
@@ -28,13 +29,15 @@ pub(super) struct ContactFilters {
 
 impl ContactFilters {
     /// The filters of a linear system; isolated particles (without springs) take no part in cluster motions.
-    pub(super) fn new(system: &System) -> Self {
+    pub(super) fn new(system: &System, layout: &Layout) -> Self {
         /// Contact stiffness below this fraction of a particle's total stiffness is ignored.
         const NEGLIGIBLE: f64 = 0.1;
         let mut filters = Self::default();
         if system.blocks.is_empty() && system.transient.is_empty() && system.isolated.is_empty() {
             return filters;
         }
+        // Terms that the coarse matrix leaves out anchor both their sides.
+        let end = if envelope(layout, system).0 < system.transient.len() { usize::MAX } else { system.anchors };
         for particle in 0..system.inertia.len() {
             if system.isolated.get(particle) == Some(&true) {
                 filters.insert(particle, system.inertia.len(), [[0.0; 3]; 3]);
@@ -42,7 +45,7 @@ impl ContactFilters {
             }
             let mut block = system.blocks.get(particle).copied().unwrap_or_default();
             if !system.transient.is_empty() {
-                system.transient.add_block(particle, 1.0, &mut block);
+                system.transient.add_block(particle, 1.0, end, &mut block);
             }
             if system.held[particle] || block.iter().all(|x| *x == 0.0) {
                 continue;
@@ -124,15 +127,11 @@ impl Layout {
         layout
     }
 
-    /// Extends the envelope `first` by the coupling between the clusters of `particles`, within the same piece.
+    /// Extends the envelope `first` by the coupling between the clusters of `particles`.
     pub(super) fn join(&self, first: &mut [u32], particles: &[u32]) {
         let clusters = || particles.iter().map(|particle| self.cluster[*particle as usize]);
         let Some(least) = clusters().min() else { return };
-        for cluster in clusters() {
-            if self.piece[cluster as usize] == self.piece[least as usize] {
-                first[cluster as usize] = first[cluster as usize].min(least);
-            }
-        }
+        clusters().for_each(|cluster| first[cluster as usize] = first[cluster as usize].min(least));
     }
 
     /// Number of rows of the coarse matrix.

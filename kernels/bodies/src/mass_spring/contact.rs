@@ -53,6 +53,8 @@ pub struct Contact {
     pub velocity: [f64; 3],
     /// Coulomb's friction coefficient μ.
     pub friction: f64,
+    /// Whether the obstacle leaves no room between it and the ground, so that nothing can meet both.
+    pub jammed: bool,
 }
 
 /// A motion for which potential contacts are wanted: particles move linearly from `from` to `to`.
@@ -83,6 +85,7 @@ pub(super) struct ContactConstraint {
     gap: f64,
     pub(super) velocity: DVec3,
     friction: f64,
+    jammed: bool,
     /// Penalty stiffness κ, N/m.
     penalty_stiffness: f64,
     /// Largest resistance of friction to a slip rate, N·s/m.
@@ -145,6 +148,7 @@ impl ContactConstraint {
             gap: contact.gap.max(0.0),
             velocity: DVec3::from(contact.velocity),
             friction: contact.friction.max(0.0),
+            jammed: contact.jammed,
             penalty_stiffness: 0.0,
             stick_limit: 0.0,
             load: 0.0,
@@ -170,6 +174,16 @@ impl ContactConstraint {
     pub(super) fn sides(&self) -> impl Iterator<Item = (usize, f64)> {
         let sides: [(usize, f64); 4] = std::array::from_fn(|k| (self.particles[k] as usize, self.weights[k]));
         sides.into_iter().filter(|(_, weight)| *weight != 0.0)
+    }
+
+    /// Whether it is between bodies: the sum of its weights is 0 there, and 1 with an obstacle.
+    pub(super) fn is_two_sided(&self) -> bool {
+        self.weights.iter().sum::<f64>().abs() < 0.5
+    }
+
+    /// Whether it is closed at `x` although the obstacle leaves no room there.
+    pub(super) fn is_jammed(&self, x: &[DVec3]) -> bool {
+        self.jammed && self.clearance(x, 0.0) < 0.0
     }
 
     /// Depth as a fraction of the gap.

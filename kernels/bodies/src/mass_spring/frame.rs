@@ -87,8 +87,7 @@ pub struct FrameReport {
     /// Solves that reached their limit of iterations while particles still moved by more than 1e-4 of the size of the
     /// bodies, and steps that left contacts too deep.
     pub caps_hit: u32,
-    /// Steps of [`Integrator::Accurate`] that were accepted with a larger estimated error than its tolerance allows. Steps
-    /// that start out of balance do not count: their estimate only tells the size of the jump.
+    /// Steps of [`Integrator::Accurate`] that were accepted with a larger estimated error than its tolerance allows.
     pub tolerance_missed: u32,
     /// Estimated error of positions that the frame added, metres: the sum over its steps of the largest error of a
     /// particle.
@@ -117,6 +116,8 @@ pub struct FrameReport {
     pub contacts: u32,
     /// Depth of the deepest contact below its gap, metres.
     pub deepest_overlap: f64,
+    /// Closed contacts with obstacles that leave no room between them and the ground: their depth is accepted.
+    pub jammed: u32,
     /// Particles whose result was not finite: they were stopped where they were.
     pub stopped: u32,
 }
@@ -217,11 +218,11 @@ fn run(stepper: &mut Stepper<'_>, motion: &mut Kinematics, energies: &mut Energi
     let steps = stepper.frame.substeps.min(MOST_STEPS);
     for step in (0..steps).take_while(|_| !(stepper.frame.cancelled)()) {
         let times = [f64::from(step) / f64::from(steps), f64::from(step + 1) / f64::from(steps)];
-        let stepped = stepper.step(motion, times, energies, accurate, false);
+        let stepped = stepper.step(motion, times, energies, accurate);
         *energies = stepped.after;
         add(report, &stepped);
         let allowed = accurate.map_or(f64::INFINITY, |tolerance| tolerance * (times[1] - times[0]));
-        report.tolerance_missed += u32::from(!stepped.damped && stepped.estimate > allowed);
+        report.tolerance_missed += u32::from(stepped.estimate > allowed);
     }
 }
 
@@ -241,8 +242,8 @@ fn halve(
     const SHORT: f64 = 1.0 / 16.0;
     /// Newton iterations of a frame after which remaining depths are accepted, so that the frame ends.
     const MOST_NEWTON: u32 = 400;
-    let (start, energy_budget, euler_steps_left) = (motion.clone(), *stepper.energy_budget, *stepper.euler_steps_left);
-    let stepped = stepper.step(motion, times, energies, None, false);
+    let start = stepper.start(motion);
+    let stepped = stepper.step(motion, times, energies, None);
     let unmet = stepped.solved.unmet > 0.0 || stepped.solved.failed;
     let share = times[1] - times[0];
     let no_help = share <= SHORT && stepped.solved.unmet > HELPS * deepest;
@@ -254,9 +255,7 @@ fn halve(
         return;
     }
     add_work(report, &stepped);
-    *motion = start;
-    (*stepper.energy_budget, *stepper.euler_steps_left) = (energy_budget, euler_steps_left);
-    stepper.refresh_inventory(motion);
+    stepper.restart(start, motion);
     let middle = 0.5 * (times[0] + times[1]);
     for half in [[times[0], middle], [middle, times[1]]] {
         halve(stepper, motion, energies, report, half, stepped.solved.unmet);
@@ -274,22 +273,19 @@ fn adapt(
     /// Bounds on the change of step size, and its safety factor.
     const CHANGE: [f64; 2] = [0.2, 4.0];
     const RESERVE: f64 = 0.9;
-    /// Newton iterations of a frame after which steps are accepted, damped and counted, so that the frame ends.
+    /// Newton iterations of a frame after which steps are accepted and counted, so that the frame ends.
     const MOST_NEWTON: u32 = 4000;
-    let (mut time, mut share, mut damp) = (0.0, 1.0_f64, false);
+    let (mut time, mut share) = (0.0, 1.0_f64);
     while time < 1.0 && !(stepper.frame.cancelled)() {
         // Equal steps to the end, which avoids a tiny last one.
         let left = 1.0 - time;
         let count = (left / share).ceil().clamp(1.0, f64::from(MOST_STEPS));
         let end = if count <= 1.0 { 1.0 } else { time + left / count };
-        let (before, energy_budget, gave_up) = (motion.clone(), *stepper.energy_budget, damp);
-        let stepped = stepper.step(motion, [time, end], energies, Some(tolerance), damp);
+        let before = stepper.start(motion);
+        let stepped = stepper.step(motion, [time, end], energies, Some(tolerance));
         let allowed = tolerance * (end - time);
         let smallest = end - time <= 2.0 / f64::from(MOST_STEPS) || report.newton >= MOST_NEWTON;
-        // Steps that start out of balance are damped, so their error estimate only tells the size of the jump; at
-        // contacts it counts.
-        let close = stepped.estimate <= allowed || stepped.damped || (stepped.euler && smallest);
-        let fits = close && (stepped.solved.unmet <= 0.0 || smallest);
+        let fits = smallest || (stepped.estimate <= allowed && stepped.solved.unmet <= 0.0);
         // The estimate ÷ step size is proportional to the step size for a first-order method, to its square for a
         // second-order one.
         let ratio = allowed / stepped.estimate;
@@ -300,18 +296,14 @@ fn adapt(
             // The estimate does not cover contacts: those that got deeper ask for shorter steps.
             share = share.min(0.5 * (end - time)).max(1.0 / f64::from(MOST_STEPS));
         }
-        // The smallest step is still inaccurate: take it damped.
-        damp = !fits && smallest;
         if fits {
             add(report, &stepped);
-            report.tolerance_missed += u32::from(gave_up || (!stepped.damped && stepped.estimate > allowed));
+            report.tolerance_missed += u32::from(stepped.estimate > allowed);
             *energies = stepped.after;
             time = end;
         } else {
             add_work(report, &stepped);
-            *motion = before;
-            *stepper.energy_budget = energy_budget;
-            stepper.refresh_inventory(motion);
+            stepper.restart(before, motion);
         }
     }
 }
@@ -332,6 +324,7 @@ fn add(report: &mut FrameReport, stepped: &Stepped) {
     report.euler_steps += u32::from(stepped.euler);
     report.stopped = report.stopped.max(stepped.stopped);
     (report.contacts, report.deepest_overlap) = (stepped.contacts, report.deepest_overlap.max(stepped.overlap));
+    report.jammed = report.jammed.max(stepped.jammed);
 }
 
 fn describe(report: &mut FrameReport, context: &FrameContext<'_>, energies: &Energies, motion: &Kinematics) {

@@ -9,6 +9,12 @@ use super::springs::Record;
 use super::system::System;
 use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
 
+/// Contacts between bodies are left out where they make factoring more than this many times as dear.
+const DEARER: f64 = 8.0;
+/// Cost of factoring that is never too much: the sum of the squared numbers of clusters in each row, worth a few
+/// milliseconds.
+const CHEAP: f64 = 2e4;
+
 /// What the matrix is assembled from.
 #[derive(Clone, Copy)]
 pub(super) struct Galerkin<'a> {
@@ -23,21 +29,16 @@ pub(super) struct Galerkin<'a> {
 impl Galerkin<'_> {
     /// Assembles the matrix and factors it.
     pub(super) fn factor(&self) -> Lower {
-        let (layout, system) = (self.layout, self.system);
-        let mut first = layout.first.clone();
-        if !system.transient.is_empty() {
-            for row in 0..system.transient.len() {
-                layout.join(&mut first, system.transient.particles(row));
-            }
-        }
+        let (layout, transient) = (self.layout, &self.system.transient);
+        let (rows, first) = envelope(layout, self.system);
         let begin = |row: usize| MODES * first[row / MODES] as usize;
         let mut matrix = Lower::zeros((0..layout.rows()).map(begin));
         let bands = Partition::new(matrix.bands(MODES));
         bands.for_each(matrix.values_mut(), |cluster, out: &mut [f64]| {
             write(&self.band(first[cluster] as usize, cluster), out);
         });
-        self.add_rank_one_terms(&system.regions, &mut matrix);
-        self.add_rank_one_terms(&system.transient, &mut matrix);
+        self.add_rank_one_terms(&self.system.regions, usize::MAX, &mut matrix);
+        self.add_rank_one_terms(transient, rows, &mut matrix);
         matrix.factor();
         matrix
     }
@@ -114,17 +115,16 @@ impl Galerkin<'_> {
         [direction.x, direction.y, direction.z, turned.x, turned.y, turned.z]
     }
 
-    /// Adds rank-one terms; coupling between different pieces is left out.
-    fn add_rank_one_terms(&self, rows: &RankOneTerms, matrix: &mut Lower) {
+    /// Adds rank-one terms, those before `end`.
+    fn add_rank_one_terms(&self, rows: &RankOneTerms, end: usize, matrix: &mut Lower) {
         let Some(partition) = rows.partition() else { return };
-        let of_part =
-            |part, ()| -> Vec<Vec<Coupling>> { partition.range(part).map(|row| self.couplings(rows, row)).collect() };
+        let of_part = |part, ()| -> Vec<Vec<Coupling>> {
+            partition.range(part).filter(|row| *row < end).map(|row| self.couplings(rows, row)).collect()
+        };
         let each = partition.map((), of_part);
-        let piece = |push: &Coupling| self.layout.piece[push.cluster];
         for couplings in each.iter().flatten() {
             for near in couplings {
-                let to = |far: &&Coupling| far.cluster <= near.cluster && piece(far) == piece(near);
-                for far in couplings.iter().filter(to) {
+                for far in couplings.iter().filter(|far| far.cluster <= near.cluster) {
                     for (i, push) in near.along.iter().enumerate() {
                         let count = if far.cluster == near.cluster { i + 1 } else { MODES };
                         for (j, other) in far.along[..count].iter().enumerate() {
@@ -160,6 +160,19 @@ impl Galerkin<'_> {
         }
         couplings
     }
+}
+
+/// The number of transient terms that the matrix has, and for each cluster the first one it is coupled to by them.
+pub(super) fn envelope(layout: &Layout, system: &System) -> (usize, Vec<u32>) {
+    let joined = |rows: usize| {
+        let mut first = layout.first.clone();
+        (0..rows).for_each(|row| layout.join(&mut first, system.transient.particles(row)));
+        let widths = first.iter().enumerate().map(|(cluster, first)| (cluster + 1 - *first as usize) as f64);
+        (widths.map(|width| width * width).sum::<f64>(), (rows, first))
+    };
+    let count = if system.transient.is_empty() { 0 } else { system.transient.len() };
+    let (anchors, all) = (joined(system.anchors.min(count)), joined(count));
+    if all.0 <= f64::max(DEARER * anchors.0, CHEAP) { all.1 } else { anchors.1 }
 }
 
 /// Change of a rank-one term by the rigid motions of one cluster.

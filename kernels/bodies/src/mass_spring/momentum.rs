@@ -9,9 +9,6 @@ use super::predictor::CayleyRotation;
 use super::stage::{FrameContext, Stage, StageSolver};
 use numerics::vector::{DMat3, DVec3};
 
-/// A contact is with an obstacle if the sum of its weights exceeds this: it is 1 there and 0 between bodies.
-const IS_OBSTACLE: f64 = 0.5;
-
 /// Total residual and translational stiffness of each group.
 pub(super) struct MomentumTarget {
     /// Sum of residuals over each group.
@@ -89,13 +86,12 @@ impl StageSolver {
         let known = stage.contacts.iter().zip(&self.contact_states).zip(&self.friction_duals).enumerate();
         let obstacle_contacts = known.filter(|known| known.1.0.1.mode != ContactMode::Open).filter_map(
             |(index, ((contact, state), dual))| {
-                let weight: f64 = contact.weights.iter().sum();
                 let piece = self.layout.piece[self.layout.cluster[contact.particles[0] as usize] as usize];
-                let group = self.groups[piece as usize].filter(|_| weight.abs() > IS_OBSTACLE)? as usize;
+                let group = self.groups[piece as usize].filter(|_| !contact.is_two_sided())? as usize;
                 Some(ObstacleContact {
                     group,
                     contact: index,
-                    weight,
+                    weight: contact.weights.iter().sum(),
                     directions: contact.stiffness_directions(state, stage.a, dual),
                 })
             },

@@ -145,10 +145,11 @@ impl RankOneTerms {
         mine.iter().fold(DVec3::zeros(), |sum, at| sum + to_f64(at.along) * self.change[at.row as usize])
     }
 
-    /// Adds `weight` times the diagonal block of `particle` to `block`.
+    /// Adds `weight` times the diagonal block of `particle` to `block`, of the terms before `end`.
     #[inline(always)]
-    pub(super) fn add_block(&self, particle: usize, weight: f64, block: &mut [f64; 6]) {
-        for at in &self.at[self.at_starts[particle] as usize..self.at_starts[particle + 1] as usize] {
+    pub(super) fn add_block(&self, particle: usize, weight: f64, end: usize, block: &mut [f64; 6]) {
+        let mine = &self.at[self.at_starts[particle] as usize..self.at_starts[particle + 1] as usize];
+        for at in mine.iter().take_while(|at| (at.row as usize) < end) {
             add_square(block, to_f64(at.along), weight);
         }
     }

@@ -318,7 +318,7 @@ impl StageSolver {
         let target = self.momentum_target(body, stage);
         self.correct_linear_momentum(body, stage, &target);
         coarse::offset_from_centroid(&body.order.clusters, x, &mut self.offset_from_centroid);
-        let filters = ContactFilters::new(&self.system);
+        let filters = ContactFilters::new(&self.system, &self.layout);
         let old = cached.factor.len() != self.layout.rows() || cached.iterations_since > OLD;
         if old || filters.change(&cached.filters) > CONTACTS_CHANGED {
             self.renew(body, cached, filters);
@@ -338,7 +338,7 @@ impl StageSolver {
         solved.cg += reached.iterations;
         if !reached.met && bound < CG_CAP {
             // The factor is too old to be useful: continue with a new one.
-            self.renew(body, cached, ContactFilters::new(&self.system));
+            self.renew(body, cached, ContactFilters::new(&self.system, &self.layout));
             let limits = Limits { share: (asked / reached.share.max(asked)).min(1.0), square, cap: CG_CAP };
             reached = self.gradients(body, cached, limits);
             solved.cg += reached.iterations;

@@ -36,6 +36,9 @@ pub(super) struct Kinematics {
     pub(super) loads: Vec<f64>,
 }
 
+/// Motion, energy budget and number of steps of implicit Euler left at the start of a step.
+pub(super) type StepStart = (Kinematics, f64, u32);
+
 /// Outcome of a step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stepped {
@@ -43,13 +46,12 @@ pub(super) struct Stepped {
     /// Largest estimated error of a particle, metres.
     pub(super) estimate: f64,
     pub(super) euler: bool,
-    /// Whether implicit Euler was used to damp the step, not because of contacts.
-    pub(super) damped: bool,
     /// Energy removed to prevent a spurious gain, joules.
     pub(super) energy_removed: f64,
     pub(super) after: Energies,
     pub(super) contacts: u32,
     pub(super) overlap: f64,
+    pub(super) jammed: u32,
     pub(super) stopped: u32,
 }
 
@@ -69,14 +71,13 @@ pub(super) struct Stepper<'a> {
 
 impl Stepper<'_> {
     /// Steps between two `times`, as fractions of the frame. `tolerance`, metres, makes Newton's method converge.
-    /// `before` are the energies at the start; `damp` asks for a damped step.
+    /// `before` are the energies at the start.
     pub(super) fn step(
         &mut self,
         motion: &mut Kinematics,
         times: [f64; 2],
         before: &Energies,
         tolerance: Option<f64>,
-        damp: bool,
     ) -> Stepped {
         let h = (times[1] - times[0]) * self.seconds;
         let start = motion.clone();
@@ -90,13 +91,12 @@ impl Stepper<'_> {
         let turned = self.frame.volume > 0.0 && self.solver.inventory.inverted > 0;
         // Frozen contacts continue linearly, so surfaces that are being separated would be thrown apart.
         let through = full.iter().any(|contact| contact.is_penetrating(&start.x, h));
-        let force_implicit_euler =
-            damp || *self.euler_steps_left > 0 || self.frame.force_implicit_euler || turned || through;
+        let force_implicit_euler = *self.euler_steps_left > 0 || self.frame.force_implicit_euler || turned || through;
         *self.euler_steps_left = self.euler_steps_left.saturating_sub(1);
         let (mut stepped, after) = if force_implicit_euler || self.frame.integrator == Integrator::Euler {
-            let damped = damp || self.frame.force_implicit_euler || turned;
+            let damped = self.frame.force_implicit_euler || turned;
             let (solved, estimate) = self.euler(motion, times, &mut full, damped);
-            (Stepped { solved, estimate, euler: true, damped, ..Stepped::default() }, None)
+            (Stepped { solved, estimate, euler: true, ..Stepped::default() }, None)
         } else {
             self.tr_bdf2_or_euler(motion, times, before, tolerance, &mut full)
         };
@@ -105,6 +105,11 @@ impl Stepper<'_> {
         }
         (stepped.contacts, stepped.overlap) = self.solver.active_contacts();
         stepped.overlap = stepped.overlap.max(stepped.solved.deepest);
+        stepped.jammed = full.iter().filter(|contact| contact.is_jammed(&motion.x)).count() as u32;
+        if stepped.jammed > 0 {
+            // Shorter steps would not help.
+            stepped.solved.unmet = 0.0;
+        }
         let discontinuous = stepped.euler || stepped.contacts > 0;
         let acceleration =
             |(v, before): (&DVec3, &DVec3)| if discontinuous { DVec3::zeros() } else { (v - before) / h };
@@ -153,11 +158,21 @@ impl Stepper<'_> {
             return (Stepped { solved, estimate, ..Stepped::default() }, Some(energies));
         }
         motion.clone_from(&start);
-        let damped = solved.failed || gained;
-        let (again, estimate) = self.euler(motion, times, contacts, damped);
+        let (again, estimate) = self.euler(motion, times, contacts, solved.failed || gained);
         let solved = Solved { failed: again.failed, residual: again.residual, ..sum(solved, again) };
         *self.euler_steps_left = if active_set_unchanged { 0 } else { EULER_STEPS_AFTER_CHANGE };
-        (Stepped { solved, estimate, euler: true, damped, ..Stepped::default() }, None)
+        (Stepped { solved, estimate, euler: true, ..Stepped::default() }, None)
+    }
+
+    /// What a step starts from, to repeat it.
+    pub(super) fn start(&self, motion: &Kinematics) -> StepStart {
+        (motion.clone(), *self.energy_budget, *self.euler_steps_left)
+    }
+
+    /// Goes back to the start of a step.
+    pub(super) fn restart(&mut self, start: StepStart, motion: &mut Kinematics) {
+        (*motion, *self.energy_budget, *self.euler_steps_left) = start;
+        self.refresh_inventory(motion);
     }
 
     /// Takes stock of the tetrahedra at the current positions, for the next step.

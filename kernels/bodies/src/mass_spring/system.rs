@@ -26,8 +26,10 @@ pub(super) struct System {
     pub(super) isolated: Vec<bool>,
     /// Terms of regions.
     pub(super) regions: RankOneTerms,
-    /// Terms of thin tetrahedra and of contacts between bodies.
+    /// Terms of thin tetrahedra, of contacts with obstacles, and of contacts between bodies.
     pub(super) transient: RankOneTerms,
+    /// Number of the first two, which hold particles in space.
+    pub(super) anchors: usize,
     /// For each particle the inverse Cholesky factor of its 3×3 diagonal block, lower triangle by rows.
     pub(super) smoother: Vec<[f32; 6]>,
 }

@@ -1,7 +1,8 @@
 //! One curve, root to tip.
 
 use super::crossing::{first_crossing, first_crossing_in};
-use super::segment_turn::{Nearby, Segment};
+use super::half_space::HalfSpace;
+use super::segment_turn::{Nearby, Segment, Turned};
 use super::{Collide, Reached, perpendicular};
 use nalgebra::Quaternion;
 use numerics::vector::{self, DQuat, DVec3, Vec3, to_f32, to_f64};
@@ -15,6 +16,10 @@ pub(super) struct Hair<'a> {
     pub(super) first: usize,
     /// Its displacement for `offset_root`.
     pub(super) shift: DVec3,
+    /// Where it meets nothing, if known.
+    pub(super) half_space: Option<&'a HalfSpace>,
+    /// Direction out of the skin at its root; zero where unknown.
+    pub(super) up: DVec3,
     pub(super) rest: &'a [Vec3],
     pub(super) goal: &'a [Vec3],
     pub(super) out: &'a mut [Vec3],
@@ -25,6 +30,8 @@ pub(super) struct Hair<'a> {
 pub(super) struct Scratch<'t> {
     nearby: Nearby<'t>,
     goal: Vec<DVec3>,
+    /// Direction of each segment; zero where it has no length.
+    directions: Vec<DVec3>,
 }
 
 /// State passed from one segment to the next.
@@ -49,7 +56,8 @@ impl Hair<'_> {
         }
         let shift = self.shift;
         self.set_goals(how, &shift, &mut scratch.goal);
-        let Scratch { nearby, goal } = scratch;
+        let Scratch { nearby, goal, directions } = scratch;
+        directions.clear();
         if shift != DVec3::zeros() {
             self.out[0] = to_f32(goal[0]);
         }
@@ -60,6 +68,7 @@ impl Hair<'_> {
             let length = (to_f64(self.goal[k + 1]) - to_f64(self.goal[k])).norm();
             if length == 0.0 || along.norm() == 0.0 {
                 self.out[k + 1] = self.out[k];
+                directions.push(DVec3::zeros());
                 continue;
             }
             let wanted = along / along.norm();
@@ -70,6 +79,10 @@ impl Hair<'_> {
             let direction = self.turn(how, k, &segment, may_keep_goal, nearby, &mut reached);
             carried.rotation = smallest_rotation(&segment.from, &direction, &carried.axis) * carried.rotation;
             carried.before = direction;
+            directions.push(direction);
+        }
+        if reached.unfreed_segments > 0 && self.fall_back(how, directions) {
+            (reached.unfreed_segments, reached.deepest_overlap, reached.blended_to_rest) = (0, 0.0, 1);
         }
         reached.crossings_left = match self.blend(how, &shift) {
             false => reached.unfreed_segments,
@@ -111,9 +124,15 @@ impl Hair<'_> {
             length,
             half: 0.5 * f64::from(how.width.at(self.first + k)),
             gap: how.gap,
-            inner: if k == 0 && how.offset_root < how.gap { SKIPPED_GAPS * how.gap } else { 0.0 },
+            inner: self.untested(how, k),
             rounding,
         }
+    }
+
+    /// Length at the start of the segment from CV k that is not tested.
+    #[inline(always)]
+    pub(super) fn untested(&self, how: &Collide<'_>, k: usize) -> f64 {
+        if k == 0 && how.offset_root < how.gap { SKIPPED_GAPS * how.gap } else { 0.0 }
     }
 
     /// Turns the segment from CV k and writes its end; returns its direction.
@@ -127,7 +146,12 @@ impl Hair<'_> {
         nearby: &mut Nearby<'t>,
         reached: &mut Reached,
     ) -> DVec3 {
-        let mut turned = segment.turn(how.method, how.obstacles, nearby);
+        let mut turned = match self.half_space {
+            Some(half_space) if half_space.frees(&(to_f64(self.rest[0]) + self.shift), segment) => {
+                Turned { direction: segment.to, met: false, clear: true }
+            }
+            _ => segment.turn(how.method, how.obstacles, nearby),
+        };
         let mut end = segment.end(&turned.direction);
         if !turned.met && may_keep_goal && self.out[k] == self.goal[k] {
             end = self.goal[k + 1];
@@ -171,25 +195,59 @@ impl Hair<'_> {
         cvs().all(|cv| cv.iter().all(|x| x.is_finite()))
     }
 
-    /// The CVs' goals: the input, or kept off the skin by `offset_scale` times their rest distance.
+    /// The CVs' goals: the input, or kept off the skin by a share of their rest heights.
     #[inline(always)]
-    fn set_goals(&self, how: &Collide<'_>, shift: &DVec3, goals: &mut Vec<DVec3>) {
+    pub(super) fn set_goals(&self, how: &Collide<'_>, shift: &DVec3, goals: &mut Vec<DVec3>) {
         goals.clear();
-        let (Some(scale), Some(skin)) = (how.offset_scale, &how.skin) else {
-            goals.extend(self.goal.iter().map(|cv| to_f64(*cv) + shift));
-            return;
-        };
+        let loft = how.loft * (1.0 - how.coherence);
+        match (how.offset_scale, &how.skin) {
+            (Some(scale), Some(skin)) => {
+                self.raise_goals(shift, goals, |k, before, step| skin.raised(self.rest[k], before, step, scale))
+            }
+            (None, _) if loft > 0.0 && self.up != DVec3::zeros() => {
+                self.raise_goals(shift, goals, |k, before, step| self.lofted(k, before, step, loft));
+            }
+            _ => goals.extend(self.goal.iter().map(|cv| to_f64(*cv) + shift)),
+        }
+    }
+
+    /// Goals from the root on, each segment replaced by what `raised` makes of its CV, the goal before it, and its step
+    /// towards its own goal.
+    #[inline(always)]
+    fn raise_goals(
+        &self,
+        shift: &DVec3,
+        goals: &mut Vec<DVec3>,
+        raised: impl Fn(usize, &DVec3, &DVec3) -> Option<DVec3>,
+    ) {
         let mut before = to_f64(self.goal[0]);
         goals.push(before + shift);
         for k in 1..self.goal.len() {
             let (from, to) = (to_f64(self.goal[k - 1]), to_f64(self.goal[k]));
-            let raised = skin.raised(self.rest[k], &to, scale);
-            // Lengths are restored root to tip: only the direction to the raised CV counts.
-            let along = raised - before;
+            // Lengths are kept root to tip: only the direction to the goal counts.
+            let along = to - before;
             let length = (to - from).norm();
-            before += if along.norm() > 0.0 { along * (length / along.norm()) } else { to - from };
+            let step = if along.norm() > 0.0 { along * (length / along.norm()) } else { to - from };
+            before += raised(k, &before, &step).unwrap_or(step);
             goals.push(before + shift);
         }
+    }
+
+    /// The step to a goal CV, turned so that its end has a share of its rest height above the root's tangent plane; `None` if
+    /// it is that high.
+    #[inline(always)]
+    fn lofted(&self, k: usize, before: &DVec3, step: &DVec3, share: f64) -> Option<DVec3> {
+        let height = |at: &DVec3, root: Vec3| self.up.dot(&(at - to_f64(root)));
+        let wanted = share * height(&to_f64(self.rest[k]), self.rest[0]);
+        let now = height(before, self.goal[0]);
+        let length = step.norm();
+        if wanted <= 0.0 || length == 0.0 || now + self.up.dot(step) >= wanted {
+            return None;
+        }
+        let rise = ((wanted - now) / length).clamp(-1.0, 1.0);
+        let level = (step - self.up * self.up.dot(step)).try_normalize(1e-9 * length);
+        let rest = || perpendicular(&self.up, &(to_f64(self.rest[k]) - to_f64(self.rest[k - 1])));
+        Some((level.unwrap_or_else(rest) * (1.0 - rise * rise).sqrt() + self.up * rise) * length)
     }
 
     /// Turns each segment back towards its goal by 1 − `blend`; returns whether any turned.
@@ -220,7 +278,7 @@ impl Hair<'_> {
 }
 
 /// Spherical interpolation from one unit vector to another; through `axis` × `from` if they are opposite.
-fn part_way(from: &DVec3, to: &DVec3, axis: &DVec3, share: f64) -> DVec3 {
+pub(super) fn part_way(from: &DVec3, to: &DVec3, axis: &DVec3, share: f64) -> DVec3 {
     let turn = from.cross(to);
     let (sine, cosine) = (turn.norm(), from.dot(to));
     let n = if sine > 1e-9 { turn / sine } else { *axis };

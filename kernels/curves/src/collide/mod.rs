@@ -3,24 +3,27 @@
 //! Root to tip, each segment starts at its rest direction, rotated along with the previous segments, and turns towards
 //! its goal's direction until it meets a triangle. A segment that earlier rotations have pushed through a surface first
 //! turns out of it, on the great circle towards the surface's normal there. First contact is a closed form (see
-//! [`sector`]).
+//! [`sector`]). A curve with a segment that no turn frees is blended towards rest (see [`towards_rest`]).
 //!
 //! Guarantees: segments keep the lengths of the goal up to the rounding of positions; written segments of a curve that
-//! crosses nothing at rest cross no triangle, except those counted in [`Collided::unfreed_segments`]; a curve without
-//! contacts keeps the goal's bits; the same bits on every SIMD path and number of threads. Limit: surfaces are
+//! crosses nothing at rest cross no triangle; a curve without contacts keeps the goal's bits; the same bits on every SIMD path and number of threads. Limit: surfaces are
 //! obstacles, not volumes, so a curve wholly inside a surface stays there.
 
 mod coherence;
 mod crossing;
 mod hair;
+mod half_space;
 mod rest;
+mod root_lift;
 mod sector;
 mod segment_turn;
 mod skin;
+mod towards_rest;
 mod triangle_filter;
 
 use coherence::Ground;
 use hair::{Hair, Scratch};
+use half_space::HalfSpace;
 use numerics::masked::Masked;
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
@@ -57,6 +60,9 @@ pub struct Collide<'a> {
     pub offset_root: f64,
     /// Raises goals to at least this multiple of the curves' height above the skin at rest.
     pub offset_scale: Option<f64>,
+    /// Share of its height at rest, above the root's tangent plane, that a CV's goal keeps, 0..1; scaled by
+    /// 1 − `coherence`, and not used with `offset_scale`.
+    pub loft: f64,
     /// The result of [`at_rest`] for the same curves, if known.
     pub at_rest: Option<&'a AtRest>,
     /// Fraction of each segment's collision response that is kept, 0..1.
@@ -79,12 +85,18 @@ impl Collide<'_> {
 pub struct Collided {
     /// One point for each input point.
     pub points: Vec<Vec3>,
-    /// Segments that could not be freed from what they cross.
+    /// Segments that could not be freed from what they cross: those of curves that cross something at rest too.
     pub unfreed_segments: u64,
     /// Segments that cross something in the written result; with full blend the same as the unfreed ones.
     pub crossings_left: u64,
+    /// The same of each curve.
+    pub crossings: Vec<i32>,
+    /// Curves blended towards rest because turns left a segment crossing something.
+    pub blended_to_rest: u64,
     /// Curves that cross something at rest.
     pub started_inside: u64,
+    /// Roots that a move of four times the root offset does not bring that far from all faces of the skin.
+    pub low_roots: u64,
     /// Segments stopped before their goal.
     pub contacts: u64,
     /// Largest distance by which a segment reaches through a surface, metres.
@@ -98,6 +110,7 @@ pub struct Collided {
 struct Reached {
     unfreed_segments: u64,
     crossings_left: u64,
+    blended_to_rest: u64,
     contacts: u64,
     deepest_overlap: f64,
     length_error: f64,
@@ -109,6 +122,7 @@ impl Reached {
             unfreed_segments: self.unfreed_segments + other.unfreed_segments,
             contacts: self.contacts + other.contacts,
             crossings_left: self.crossings_left + other.crossings_left,
+            blended_to_rest: self.blended_to_rest + other.blended_to_rest,
             deepest_overlap: self.deepest_overlap.max(other.deepest_overlap),
             length_error: self.length_error.max(other.length_error),
         }
@@ -139,10 +153,11 @@ pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how:
             &computed
         }
     };
-    let mut points = vec![[0.0; 3]; goal.len()];
-    let mut tasks = Vec::new();
-    let mut left = &mut points[..];
+    let known = Known { at_rest, half_spaces: at_rest.used(path, starts, rest, how) };
     let curves = starts.len().saturating_sub(1);
+    let (mut points, mut crossings) = (vec![[0.0; 3]; goal.len()], vec![0; curves]);
+    let mut tasks = Vec::new();
+    let (mut left, mut left_crossings) = (&mut points[..], &mut crossings[..]);
     let mut first = 0;
     while first < curves {
         let mut end = first;
@@ -150,15 +165,39 @@ pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how:
             end += 1;
         }
         let (out, rest) = left.split_at_mut((starts[end] - starts[first]) as usize);
-        tasks.push((first..end, out));
-        (left, first) = (rest, end);
+        let (crossings, rest_of_curves) = left_crossings.split_at_mut(end - first);
+        tasks.push((first..end, Written { points: out, crossings }));
+        (left, left_crossings, first) = (rest, rest_of_curves, end);
     }
     let reached =
-        parallel::map(tasks, |_, (curves, out)| collide_task(path, curves, starts, [rest, goal], how, at_rest, out));
+        parallel::map(tasks, |_, (curves, out)| collide_task(path, curves, starts, [rest, goal], how, known, out));
     let reached = reached.into_iter().fold(Reached::default(), Reached::and);
-    let Reached { unfreed_segments, crossings_left, contacts, deepest_overlap, length_error } = reached;
-    let started_inside = at_rest.inside();
-    Collided { points, unfreed_segments, crossings_left, started_inside, contacts, deepest_overlap, length_error }
+    Collided {
+        points,
+        crossings,
+        started_inside: at_rest.inside(),
+        low_roots: at_rest.low_roots(),
+        unfreed_segments: reached.unfreed_segments,
+        crossings_left: reached.crossings_left,
+        blended_to_rest: reached.blended_to_rest,
+        contacts: reached.contacts,
+        deepest_overlap: reached.deepest_overlap,
+        length_error: reached.length_error,
+    }
+}
+
+/// What is known of all curves at rest.
+#[derive(Clone, Copy)]
+struct Known<'a> {
+    at_rest: &'a AtRest,
+    /// One for each curve, or none.
+    half_spaces: &'a [HalfSpace],
+}
+
+/// Where a task writes.
+struct Written<'a> {
+    points: &'a mut [Vec3],
+    crossings: &'a mut [i32],
 }
 
 kernel! {
@@ -167,8 +206,8 @@ kernel! {
         starts: &[u32],
         positions: [&[Vec3]; 2],
         how: &Collide<'_>,
-        at_rest: &AtRest,
-        out: &mut [Vec3],
+        known: Known<'_>,
+        out: Written<'_>,
     ) -> Reached = task;
 }
 
@@ -178,22 +217,26 @@ fn task(
     starts: &[u32],
     [rest, goal]: [&[Vec3]; 2],
     how: &Collide<'_>,
-    at_rest: &AtRest,
-    out: &mut [Vec3],
+    Known { at_rest, half_spaces }: Known<'_>,
+    out: Written<'_>,
 ) -> Reached {
     let mut scratch = Scratch::default();
     let mut reached = Reached::default();
     let base = starts[curves.start] as usize;
-    for curve in curves {
+    for (curve, crossings) in curves.zip(out.crossings) {
         let cvs = starts[curve] as usize..starts[curve + 1] as usize;
         let mut hair = Hair {
             first: cvs.start,
             shift: at_rest.shift(curve),
+            half_space: half_spaces.get(curve),
+            up: at_rest.up(curve),
             rest: &rest[cvs.clone()],
             goal: &goal[cvs.clone()],
-            out: &mut out[cvs.start - base..cvs.end - base],
+            out: &mut out.points[cvs.start - base..cvs.end - base],
         };
-        reached = reached.and(hair.collide(how, &mut scratch));
+        let one = hair.collide(how, &mut scratch);
+        *crossings = one.crossings_left as i32;
+        reached = reached.and(one);
     }
     reached
 }

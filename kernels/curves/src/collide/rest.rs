@@ -2,10 +2,13 @@
 
 use super::Collide;
 use super::crossing::first_crossing;
+use super::half_space::{HalfSpace, SAME_SIDE};
 use super::segment_turn::{Nearby, gather};
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Number of successive segments that share one query of the trees.
 const GATHERED_SEGMENTS: usize = 6;
@@ -14,9 +17,14 @@ const GATHERED_SEGMENTS: usize = 6;
 const TASK_CURVES: usize = 64;
 
 /// Everything that depends only on curves, obstacles and skin at rest, not on the wind; see [`at_rest`].
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct AtRest {
     curves: Vec<Grown>,
+    /// How often it was used.
+    uses: AtomicU32,
+    /// Found at the second use: on a skin that moves in each frame there is none, and they would cost more than they
+    /// save.
+    half_spaces: OnceLock<Vec<HalfSpace>>,
 }
 
 /// A curve at rest.
@@ -26,10 +34,14 @@ pub(super) struct Grown {
     pub(super) shift: DVec3,
     /// Whether it crosses something, displaced.
     pub(super) inside: bool,
+    /// Whether its root is nearer to the skin than that.
+    pub(super) low: bool,
+    /// Direction out of the skin at its root; zero without `loft`.
+    pub(super) up: DVec3,
 }
 
-/// Examines curves at rest. The result depends on `obstacles`, `skin` and `offset_root` of `how` only: keep it and pass
-/// it in [`Collide::at_rest`] while these and the curves do not change.
+/// Examines curves at rest. The result depends on `obstacles`, `skin` and `offset_root` of `how`, and on whether its
+/// `loft` is 0: keep it and pass it in [`Collide::at_rest`] while these and the curves do not change.
 ///
 /// # Panics
 /// As [`super::collide()`].
@@ -43,7 +55,7 @@ pub(super) fn at_rest_on(path: Path, starts: &[u32], rest: &[Vec3], how: &Collid
         let first = task * TASK_CURVES;
         grow(path, &starts[first..=first + grown.len()], rest, how, grown);
     });
-    AtRest { curves }
+    AtRest { curves, ..AtRest::default() }
 }
 
 kernel! {
@@ -59,9 +71,42 @@ fn grow_task(starts: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut [Grow
             continue;
         }
         if let Some(skin) = &how.skin {
-            grown.shift = skin.lift(cvs[0], how.offset_root);
+            let lifted = skin.lift(cvs[0], how.offset_root);
+            (grown.shift, grown.low) = (lifted.shift, lifted.low);
+            if how.loft > 0.0 {
+                grown.up = skin.facet(&to_f64(cvs[0]), SAME_SIDE).map_or(DVec3::zeros(), |(up, _)| up);
+            }
         }
         grown.inside = crosses_any(cvs, &grown.shift, how, &mut nearby);
+    }
+}
+
+kernel! {
+    fn look_up(
+        first: usize,
+        starts: &[u32],
+        rest: &[Vec3],
+        how: &Collide<'_>,
+        grown: &[Grown],
+        out: &mut [HalfSpace],
+    ) = look_up_task;
+}
+
+#[inline(always)]
+fn look_up_task(
+    first: usize,
+    starts: &[u32],
+    rest: &[Vec3],
+    how: &Collide<'_>,
+    grown: &[Grown],
+    out: &mut [HalfSpace],
+) {
+    for (k, out) in out.iter_mut().enumerate() {
+        let cvs = starts[first + k] as usize..starts[first + k + 1] as usize;
+        if cvs.len() >= 2 && rest[cvs.clone()].as_flattened().iter().all(|x| x.is_finite()) {
+            let width = cvs.clone().fold(0.0, |most: f32, cv| most.max(how.width.at(cv)));
+            *out = HalfSpace::of(&rest[cvs], &grown[first + k].shift, f64::from(width), how);
+        }
     }
 }
 
@@ -92,6 +137,36 @@ impl AtRest {
     /// Number of curves that cross something.
     pub(super) fn inside(&self) -> u64 {
         self.curves.iter().map(|curve| u64::from(curve.inside)).sum()
+    }
+
+    /// Counts a use, and finds half-spaces at the second one. Uses beside it get none, instead of waiting for a thread
+    /// that may be waiting for them.
+    pub(super) fn used(&self, path: Path, starts: &[u32], rest: &[Vec3], how: &Collide<'_>) -> &[HalfSpace] {
+        if self.uses.fetch_add(1, Ordering::Relaxed) == 1 && how.skin.is_some() {
+            let mut found = vec![HalfSpace::default(); self.curves.len()];
+            parallel::for_each(found.chunks_mut(TASK_CURVES), |task, out| {
+                look_up(path, task * TASK_CURVES, starts, rest, how, &self.curves, out);
+            });
+            let _ = self.half_spaces.set(found);
+        }
+        self.half_spaces.get().map_or(&[], Vec::as_slice)
+    }
+
+    /// Number of half-spaces found so far that may free something.
+    #[cfg(test)]
+    pub(super) fn half_spaces_found(&self) -> usize {
+        let found = self.half_spaces.get().map_or(&[][..], Vec::as_slice);
+        found.iter().filter(|found| **found != HalfSpace::default()).count()
+    }
+
+    /// Number of roots that are nearer to the skin than the root offset.
+    pub(super) fn low_roots(&self) -> u64 {
+        self.curves.iter().map(|curve| u64::from(curve.low)).sum()
+    }
+
+    /// The direction out of the skin at a curve's root; zero where unknown.
+    pub(super) fn up(&self, curve: usize) -> DVec3 {
+        self.curves[curve].up
     }
 
     /// The displacement of a curve.

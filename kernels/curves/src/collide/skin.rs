@@ -1,11 +1,16 @@
 //! The surface that curves grow on: its outward normal, and heights above it.
 
 use super::coherence::Ground;
-use numerics::tree::{Closest, TriangleTree};
-use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
+use super::crossing::corners;
+use super::perpendicular;
+use numerics::tree::{Closest, Cuboid, TriangleTree};
+use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
 
-/// Largest number of times that a root is lifted, as the surface may curve below it.
-const LIFTS: usize = 4;
+/// Largest number of turns that raise a segment.
+const TURNS: usize = 3;
+
+/// Share of the height wanted by which a raised CV may miss it.
+const HEIGHT_ERROR: f64 = 1e-3;
 
 /// A skin: tree, triangles and normals of its points.
 #[derive(Clone, Copy)]
@@ -45,9 +50,38 @@ impl SkinSurface<'_> {
         mixed.try_normalize(1e-12)
     }
 
+    /// The corners of the triangle of a point found.
+    #[inline(always)]
+    pub(super) fn corners(&self, at: &Closest) -> Option<[DVec3; 3]> {
+        // The point lies on its triangle up to rounding.
+        let slack = 4e-6 * (vector::largest(at.point) + at.distance);
+        let [low, high] = [-slack, slack].map(|slack| at.point.map(|x| x + slack));
+        let mut walk = self.tree.walk(Cuboid { low, high });
+        walk.find_map(|(block, _)| {
+            let block = &self.tree.blocks()[block];
+            let lane = block.triangle.iter().position(|triangle| *triangle == at.triangle)?;
+            Some(corners(block, lane))
+        })
+    }
+
+    /// The corners of the triangle nearest to a point, and the direction out of the surface there: that triangle's normal
+    /// if it lies along the interpolated one by a cosine above `same_side`, else the interpolated one.
+    #[inline(always)]
+    pub(super) fn facet(&self, p: &DVec3, same_side: f64) -> Option<(DVec3, [DVec3; 3])> {
+        let at = self.tree.closest(to_f32(*p), f32::INFINITY)?;
+        let corners = self.corners(&at)?;
+        let flat = (corners[1] - corners[0]).cross(&(corners[2] - corners[0])).try_normalize(0.0);
+        let flat = flat.filter(|normal| normal.iter().all(|x| x.is_finite()));
+        let up = match (flat, self.normal(&at)) {
+            (Some(flat), Some(smooth)) if flat.dot(&smooth) > same_side => flat,
+            (flat, smooth) => smooth.or(flat)?,
+        };
+        Some((up, corners))
+    }
+
     /// Height of a point above the surface, negative inside, and the normal there.
     #[inline(always)]
-    fn height(&self, p: &DVec3, reach: f32) -> Option<(f64, DVec3)> {
+    pub(super) fn height(&self, p: &DVec3, reach: f32) -> Option<(f64, DVec3)> {
         let closest = self.tree.closest([p.x as f32, p.y as f32, p.z as f32], reach)?;
         let normal = self.normal(&closest)?;
         let away = p - to_f64(closest.point);
@@ -63,37 +97,37 @@ impl SkinSurface<'_> {
         Some(Ground { normal, height: height.max(0.0) })
     }
 
-    /// A CV's goal, raised to `scale` times the CV's height above the skin at rest; unchanged if it is that high
-    /// already.
+    /// The step from a goal CV at `before` to the next one, turned so that its end is at `share` times the next CV's height
+    /// above the skin at rest; `None` if it is that high already.
+    ///
+    /// Turning changes the height by about the change of the step along the normal at its end: exact on a plane. Elsewhere
+    /// that is repeated.
     #[inline(always)]
-    pub(super) fn raised(&self, rest: Vec3, goal: &DVec3, scale: f64) -> DVec3 {
+    pub(super) fn raised(&self, rest: Vec3, before: &DVec3, step: &DVec3, share: f64) -> Option<DVec3> {
         let rest = to_f64(rest);
-        let Some((height, _)) = self.height(&rest, f32::INFINITY) else { return *goal };
+        let (height, _) = self.height(&rest, f32::INFINITY)?;
+        let (wanted, length) = (share * height, step.norm());
         // It cannot have come closer by more than its displacement.
-        let moved = (goal - rest).norm();
-        if height - moved >= scale * height {
-            return *goal;
+        let moved = (before + step - rest).norm();
+        if height - moved >= wanted {
+            return None;
         }
-        match self.height(goal, 2.0 * ((moved + height.abs()) as f32)) {
-            Some((now, normal)) if now < scale * height => goal + normal * (scale * height - now),
-            _ => *goal,
-        }
-    }
-
-    /// The displacement that lifts a root to `offset` above the skin: zero if it is that high already.
-    #[inline(always)]
-    pub(super) fn lift(&self, root: Vec3, offset: f64) -> DVec3 {
-        let mut shift = DVec3::zeros();
-        if offset <= 0.0 {
-            return shift;
-        }
-        for _ in 0..LIFTS {
-            let Some((height, normal)) = self.height(&(to_f64(root) + shift), f32::INFINITY) else { break };
-            if height >= offset * 0.999 {
+        let reach = 2.0 * (moved + height.abs() + length) as f32;
+        let mut along = step.try_normalize(0.0)?;
+        for turn in 0..TURNS {
+            let Some((now, normal)) = self.height(&(before + along * length), reach) else { break };
+            if turn == 0 && now >= wanted {
+                return None;
+            }
+            if (now - wanted).abs() < HEIGHT_ERROR * wanted.abs() {
                 break;
             }
-            shift += normal * (offset - height);
+            let up = along.dot(&normal);
+            let rise = (up + (wanted - now) / length).clamp(-1.0, 1.0);
+            let level = (along - normal * up).try_normalize(1e-9);
+            let level = level.unwrap_or_else(|| perpendicular(&normal, &(rest - before)));
+            along = level * (1.0 - rise * rise).sqrt() + normal * rise;
         }
-        shift
+        Some(along * length)
     }
 }

@@ -5,7 +5,10 @@ use super::*;
 use numerics::random::Key;
 use numerics::vector::{self, to_f64};
 
+mod freed;
 mod hairs;
+pub(super) mod kept;
+mod raised;
 mod sectors;
 
 /// Whether the segment crosses the triangle, by solving for its point in the plane. Touching does not count.

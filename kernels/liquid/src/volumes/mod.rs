@@ -134,7 +134,7 @@ pub struct VolumeReport {
     pub pieces: usize,
     /// The largest error of a piece's volume, m³.
     pub worst: f64,
-    /// The largest error of the volume of a phase ÷ its target, where there are several.
+    /// The largest error of the share that a phase has of the volume, relative to what it should be; 0 where there is one.
     pub phase_drift: f64,
     /// The farthest that a surface was moved, in solver cells.
     pub moved: f64,
@@ -349,7 +349,7 @@ impl VolumeTargets {
             corrected_now: 0.0,
             pieces: found.all.len(),
             worst: errors.fold(0.0, |worst, error| worst.max(error.abs())),
-            phase_drift: self.phase_drift(found, unit),
+            phase_drift: self.phase_drift(found),
             moved,
             lost,
         }
@@ -367,12 +367,13 @@ impl VolumeTargets {
         self.pieces.iter().map(|piece| piece.phases.len()).max().max(waiting).unwrap_or(1)
     }
 
-    /// The largest error of the volume of a phase ÷ its target.
-    fn phase_drift(&self, found: &Pieces, unit: f64) -> f64 {
+    /// The largest error of the share that a phase has of all volume, relative to what it should be.
+    fn phase_drift(&self, found: &Pieces) -> f64 {
         let drift = |phase: usize| {
-            let target = self.pieces.iter().fold(0.0, |sum, piece| sum + piece.of_phase(phase));
-            let volume = (0..found.all.len()).fold(0.0, |sum, piece| sum + unit * found.volume_of(piece, phase));
-            if target > 0.0 { (volume / target - 1.0).abs() } else { 0.0 }
+            let target = self.pieces.iter().fold(0.0, |sum, piece| sum + piece.of_phase(phase)) / self.target();
+            let share =
+                (0..found.all.len()).fold(0.0, |sum, piece| sum + found.volume_of(piece, phase)) / found.volume();
+            if target > 0.0 { (share / target - 1.0).abs() } else { 0.0 }
         };
         if found.phases.count() > 1 { (0..self.phases()).map(drift).fold(0.0, f64::max) } else { 0.0 }
     }

@@ -375,7 +375,8 @@ fn a_phase_that_lost_volume_has_it_back() {
     let sunk = |p: Vec3| [0.0, -0.1 * (10.5 - p[0]).clamp(0.0, 1.0), 0.0];
     step(&mut surface, &flow(size, sunk), 0.2);
     let seen = targets.measure(&mut surface, None, Some(&materials.phases()));
-    assert_near(seen.phase_drift, 0.02, 0.06);
+    // One half has lost 2 %, both together 1 %.
+    assert_near(seen.phase_drift, 0.01, 0.06);
     let fixed = targets.correct_within(&mut surface, None, Some(&mut materials), CAP);
     assert!(fixed.phase_drift < 2e-3 && fixed.drift.abs() < 1e-4, "{fixed:?}");
     let heights = |low: f32, high: f32| {

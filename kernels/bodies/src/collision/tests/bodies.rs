@@ -5,12 +5,12 @@ use crate::mass_spring::{BodySolver, Material, Mesh, SoftBody, SolverFrame, Stat
 use crate::tets::{boundary, cubes};
 use numerics::masked::Masked;
 
-const FRAME: f64 = 1.0 / 24.0;
+pub(super) const FRAME: f64 = 1.0 / 24.0;
 
-type Block = (Vec<[f64; 3]>, Vec<[u32; 4]>, Vec<[u32; 3]>);
+pub(super) type Block = (Vec<[f64; 3]>, Vec<[u32; 4]>, Vec<[u32; 3]>);
 
 /// A block of cubes of `side` with its lowest corner at `at`: particles, tets, and outward surface triangles.
-fn block(cells: [usize; 3], side: f64, at: [f64; 3]) -> Block {
+pub(super) fn block(cells: [usize; 3], side: f64, at: [f64; 3]) -> Block {
     let (points, tets) = cubes(cells, at, cells.map(|n| side * n as f64));
     let narrow: Vec<_> = points.iter().map(|p| p.map(|x| x as f32)).collect();
     let outer = boundary(&tets, &narrow).iter().map(|face| face.corners).collect();
@@ -57,7 +57,7 @@ fn fastest(state: &State) -> f64 {
     state.velocities.iter().map(|v| DVec3::from(*v).norm()).fold(0.0, f64::max)
 }
 
-const THICKNESS: f64 = 1e-3;
+pub(super) const THICKNESS: f64 = 1e-3;
 
 /// A pin that rolls ten thicknesses a frame, 1 cm deep in the block of [`rolled_over`].
 fn rolling(frame: f64) -> (Vec<[f64; 3]>, Vec<[u32; 3]>) {
@@ -100,7 +100,7 @@ fn projecting_onto_contacts_keeps_vertices_outside_a_rolling_pin() {
     let mut now = points.clone();
     // Vertices that are moved only by projection onto their contacts.
     let put = |scene: &CollisionScene<'_>| {
-        let (mut contacts, _) = find(scene, &now, &now, [0.0, 1.0]);
+        let mut contacts = find(scene, &now, &now, [0.0, 1.0]);
         contacts.retain(|contact| contact.weights[1] == 0.0);
         for _ in 0..50 {
             for contact in &contacts {
@@ -245,4 +245,38 @@ fn a_corner_snagged_on_a_plate_is_released_when_overstretched() {
         assert_eq!(at > high, hangs, "beyond {high} m, then at {at} m");
         assert_eq!(skins[0].released_edges(&state.positions), 0);
     }
+}
+
+/// CG iterations a Newton iteration in a stack of some boxes that come to rest on each other.
+fn stacked(boxes: usize) -> f64 {
+    let (mut points, mut tets, mut surfaces) = (Vec::new(), Vec::new(), Vec::new());
+    for k in 0..boxes {
+        let (own, of_box, faces) = block([4; 3], 0.05, [0.03 * k as f64, 0.002 + 0.203 * k as f64, 0.02 * k as f64]);
+        let first = points.len() as u32;
+        points.extend(own);
+        tets.extend(of_box.iter().map(|tet| tet.map(|corner| corner + first)));
+        surfaces.push(faces.iter().map(|face| face.map(|corner| corner + first)).collect::<Vec<_>>());
+    }
+    let body = body(&points, &tets, 1e5);
+    let surfaces: Vec<&[[u32; 3]]> = surfaces.iter().map(Vec::as_slice).collect();
+    let skins = BodySkin::several(&points, &surfaces, &body.springs()).unwrap();
+    let ground = Some(Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness: THICKNESS, friction: 0.5 });
+    let body_contact = Some(ContactParams { thickness: THICKNESS, friction: 0.5 });
+    let scene = CollisionScene { skins: &skins, ground, body_contact, ..CollisionScene::default() };
+    let frame = SolverFrame { contacts: Some(&scene), seconds: FRAME, ..SolverFrame::default() };
+    let (mut state, mut solver) = (State::at_rest(&body), BodySolver::new(&body));
+    let (mut newton, mut cg) = (0, 0);
+    for _ in 0..24 {
+        let report = solver.step(&body, &mut state, &frame);
+        (newton, cg) = (newton + report.newton, cg + report.cg);
+    }
+    f64::from(cg) / f64::from(newton)
+}
+
+/// Contacts between bodies are part of the coarse system; without, two boxes take 5.3 times as many.
+#[test]
+fn a_stack_of_boxes_takes_hardly_more_linear_iterations_than_one() {
+    let one = stacked(1);
+    let [two, three] = [2, 3].map(stacked);
+    assert!(two < 2.5 * one && three < 2.5 * one, "{one}, {two}, {three}");
 }

@@ -6,21 +6,17 @@ use numerics::shapes;
 
 mod bodies;
 mod hand;
+mod soft;
 mod tunnelling;
 
 fn pose(share: f64, positions: &[[f64; 3]]) -> ObstaclePose {
     ObstaclePose { share, positions: positions.to_vec() }
 }
 
-fn find(
-    scene: &CollisionScene<'_>,
-    from: &[[f64; 3]],
-    to: &[[f64; 3]],
-    times: [f64; 2],
-) -> (Vec<Contact>, ContactSummary) {
+fn find(scene: &CollisionScene<'_>, from: &[[f64; 3]], to: &[[f64; 3]], times: [f64; 2]) -> Vec<Contact> {
     let mut out = Vec::new();
-    let found = scene.search(&ContactQuery { from, to, times }, &mut out);
-    (out, found)
+    scene.find(&ContactQuery { from, to, times }, &mut out);
+    out
 }
 
 fn random(seed: u64, index: u64) -> DVec3 {

@@ -1,4 +1,4 @@
-//! Closed forms in addition to those in tests/softbody/accuracy: a hanging chain, a rotating spring.
+//! Closed forms in addition to those in tests/softbody/accuracy: a hanging chain, a rotating spring, weights.
 
 use super::*;
 
@@ -39,4 +39,22 @@ fn a_dashpot_does_not_damp_rotation() {
             }
         }
     }
+}
+
+#[test]
+fn the_piece_that_carries_its_weight_worst_gives_the_ratio_of_stiffness_to_weight() {
+    let (mut points, mut tets) = block([4, 2, 2], 0.1);
+    let first = points.len() as u32;
+    let (other, others) = block([2, 3, 2], 0.1);
+    points.extend(other.iter().map(|[x, y, z]| [x + 1.0, *y, *z]));
+    tets.extend(others.iter().map(|tet| tet.map(|corner| corner + first)));
+    let body = SoftBody::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material(1e3, 1e4, 0.0), &[])
+        .unwrap();
+    // Their heights along x and along y, metres.
+    for (gravity, height) in [([-9.81, 0.0, 0.0], 0.4), ([0.0, -9.81, 0.0], 0.3), ([0.0, 2.0, 0.0], 0.3)] {
+        let exact = 1e4 / (1e3 * DVec3::from(gravity).norm() * height);
+        let ratio = body.stiffness_to_weight(gravity);
+        assert!((ratio / exact - 1.0).abs() < 1e-12, "{ratio} is not {exact}");
+    }
+    assert_eq!(body.stiffness_to_weight([0.0; 3]), f64::INFINITY);
 }

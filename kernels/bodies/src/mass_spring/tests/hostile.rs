@@ -32,10 +32,19 @@ fn scramble(state: &mut State, cells: f64) {
     }
 }
 
+/// Fewer where each of them has 256 steps.
+fn frames(integrator: Integrator) -> usize {
+    if matches!(integrator, Integrator::Accurate { .. }) { 4 } else { 24 }
+}
+
 fn survives(body: &SoftBody, state: &mut State, frame: &SolverFrame<'_>, bound: f64) -> FrameReport {
+    survives_for(24, body, state, frame, bound)
+}
+
+fn survives_for(frames: usize, body: &SoftBody, state: &mut State, frame: &SolverFrame<'_>, bound: f64) -> FrameReport {
     let mut solver = BodySolver::new(body);
     let mut report = FrameReport::default();
-    for number in 0..24 {
+    for number in 0..frames {
         report = solver.step(body, state, frame);
         let worst = state.positions.iter().flatten().fold(0.0_f64, |worst, x| worst.max(x.abs()));
         assert!(is_finite(state) && worst < bound, "{:?}: {worst} in frame {number}", frame.integrator);
@@ -53,7 +62,7 @@ fn stiffness_over_eighteen_decades_in_one_body_stays_bounded() {
             let mut state = State::at_rest(&body);
             scramble(&mut state, cells);
             let frame = SolverFrame { integrator, volume: 0.0, ..SolverFrame::default() };
-            let _ = survives(&body, &mut state, &frame, 20.0);
+            let _ = survives_for(frames(integrator), &body, &mut state, &frame, 20.0);
         }
     }
 }
@@ -66,7 +75,8 @@ fn any_stiffness_stays_bounded_from_a_scrambled_start() {
                 let body = mixed(|_| k, |_| 0.01);
                 let mut state = State::at_rest(&body);
                 scramble(&mut state, cells);
-                let _ = survives(&body, &mut state, &SolverFrame { integrator, ..BARE }, 20.0);
+                let frame = SolverFrame { integrator, ..BARE };
+                let _ = survives_for(frames(integrator), &body, &mut state, &frame, 20.0);
             }
         }
     }
@@ -128,7 +138,7 @@ fn a_mirrored_tetrahedron_recovers() {
 fn zero_length_springs_and_coinciding_particles_stay_finite() {
     for integrator in HOW {
         let points = [[0.0; 3]; 4];
-        let spring = |a: u32, b: u32, length: f64| BodySpring { ends: [a, b], stiffness: 1e4, damping: 1.0, length };
+        let spring = |a: u32, b: u32, length: f64| BodySpring { ends: [a, b], stiffness: 1e4, damping: 10.0, length };
         let springs = [spring(0, 1, 0.0), spring(1, 2, 0.5), spring(2, 3, 0.5), spring(1, 3, 0.5)];
         let body = SoftBody::of_springs(&points, &[1.0; 4], &springs).unwrap();
         let mut state = State::at_rest(&body);

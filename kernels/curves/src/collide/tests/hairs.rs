@@ -6,7 +6,7 @@ use numerics::masked::Masked;
 const PLAIN: Masked<'static, f32> = Masked::uniform(0.0);
 const WHOLE: Masked<'static, f32> = Masked::uniform(1.0);
 
-fn on<'a>(obstacles: &'a [&'a TriangleTree]) -> Collide<'a> {
+pub(super) fn on<'a>(obstacles: &'a [&'a TriangleTree]) -> Collide<'a> {
     Collide {
         obstacles,
         skin: None,
@@ -14,6 +14,7 @@ fn on<'a>(obstacles: &'a [&'a TriangleTree]) -> Collide<'a> {
         gap: 1e-4,
         offset_root: 1e-4,
         offset_scale: None,
+        loft: 0.0,
         coherence: 0.0,
         at_rest: None,
         blend: WHOLE,
@@ -22,7 +23,7 @@ fn on<'a>(obstacles: &'a [&'a TriangleTree]) -> Collide<'a> {
 }
 
 /// A square floor of two triangles at height 0.
-fn floor() -> (Vec<Vec3>, Vec<[u32; 3]>) {
+pub(super) fn floor() -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let points = vec![[-9.0, 0.0, -9.0], [-9.0, 0.0, 9.0], [9.0, 0.0, 9.0], [9.0, 0.0, -9.0]];
     (points, vec![[0, 1, 2], [0, 2, 3]])
 }
@@ -86,7 +87,7 @@ fn crossings(starts: &[u32], points: &[Vec3], (mesh, triangles): &(Vec<Vec3>, Ve
     segments.filter(|pair| corners.iter().any(|corners| crosses(&to_f64(pair[0]), &to_f64(pair[1]), corners))).count()
 }
 
-fn worst_length(starts: &[u32], goal: &[Vec3], points: &[Vec3]) -> f64 {
+pub(super) fn worst_length(starts: &[u32], goal: &[Vec3], points: &[Vec3]) -> f64 {
     let mut worst = 0.0_f64;
     for ends in starts.windows(2) {
         let cvs = ends[0] as usize..ends[1] as usize;

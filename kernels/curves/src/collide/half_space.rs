@@ -1,0 +1,164 @@
+//! A half-space for each curve that no obstacle enters: segments well inside it are free without a query of the trees.
+//!
+//! Along a direction `up`, nothing near a curve is higher above its root than `rise`. A segment whose turn stays above
+//! that by more than its gap meets nothing. Where the tests here say so, a sweep through the trees ends at the goal
+//! with nothing met, so results keep their bits; `rise` has margins for the rounding of that sweep.
+
+use super::Collide;
+use super::segment_turn::Segment;
+use numerics::lanes::LANES;
+use numerics::tree::{Block, Boxes, Region};
+use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
+
+/// Rounding relative to the largest coordinate: of f32 positions and boxes 1e-7, of the plane of a turn, whose sine is at
+/// least 1e-9, 2e-7.
+const ROUNDING: f64 = 5e-7;
+
+/// Cosine of the angle between the facet under a root and the smooth normal up to which the facet's normal is taken. It
+/// is preferred because the smooth one tilts: along it the root's own facet rises beside the root.
+pub(super) const SAME_SIDE: f64 = 0.8;
+
+/// 1 + the cosine of a turn close to half a turn, whose plane rounding decides.
+const OPPOSITE: f64 = 0.01;
+
+/// The half-space of a curve. The default one frees nothing.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct HalfSpace {
+    /// Its direction, at most of length 1.
+    up: Vec3,
+    /// Distance from the root, metres, within which all obstacles are known.
+    reach: f32,
+    /// The highest point of obstacles there above the root, metres.
+    rise: f32,
+}
+
+impl HalfSpace {
+    /// The half-space of the curve `cvs`, displaced by `shift`, whose largest diameter is `width` metres.
+    #[inline(always)]
+    pub(super) fn of(cvs: &[Vec3], shift: &DVec3, width: f64, how: &Collide<'_>) -> Self {
+        let root = to_f64(cvs[0]) + shift;
+        let length: f64 = cvs.windows(2).map(|ends| (to_f64(ends[1]) - to_f64(ends[0])).norm()).sum();
+        let reach = 1.001 * (length + how.gap) + 2.0 * width;
+        let scale = f64::from(vector::largest(to_f32(root))) + reach;
+        let slack = ROUNDING * scale;
+        let Some((up, facet)) = how.skin.as_ref().and_then(|skin| skin.facet(&root, SAME_SIDE)) else {
+            return Self::default();
+        };
+        // Shortened by more than the rounding to f32 may lengthen it.
+        let up = to_f32(up * (1.0 - 1e-6));
+        let mut above = Above {
+            low: to_f32(root.map(|x| x - reach - 8.0 * slack)),
+            high: to_f32(root.map(|x| x + reach + 8.0 * slack)),
+            root: to_f32(root),
+            up,
+            rise: f64::NEG_INFINITY,
+            below: f32::NEG_INFINITY,
+            slack: slack as f32,
+            reach: reach as f32,
+        };
+        above.add(&facet, &root);
+        for tree in how.obstacles {
+            let mut walk = tree.walk(above);
+            while let Some((block, lanes)) = walk.next() {
+                walk.region().add_lanes(&tree.blocks()[block], lanes, &root);
+                // No segment starts higher than the curve is long.
+                if walk.region().rise > length {
+                    return Self::default();
+                }
+            }
+            above = *walk.region();
+        }
+        Self { up, reach: reach as f32, rise: ((above.rise + slack) as f32).next_up() }
+    }
+
+    /// Whether the turn of a segment, of a curve with this root, meets nothing: it stays above all obstacles by more
+    /// than their distance to be kept.
+    #[inline(always)]
+    pub(super) fn frees(&self, root: &DVec3, segment: &Segment) -> bool {
+        let Segment { pivot, from, to, length, half, gap, rounding, .. } = segment;
+        let away = pivot - root;
+        let room = f64::from(self.reach) - (length + gap + 3.0 * half + 4.0 * rounding);
+        let (up, facing) = (to_f64(self.up), 1.0 + from.dot(to));
+        let in_reach = room > 0.0 && away.norm_squared() <= room * room;
+        if !in_reach || !facing.is_finite() || facing < OPPOSITE {
+            return false;
+        }
+        // Height of the pivot above everything, and a lower bound of the slopes of the turn: that of an end if both
+        // rise, else that of the middle of a turn between two ends as low as the lower one.
+        let height = up.dot(&away) - f64::from(self.rise) - rounding;
+        let slope = from.dot(&up).min(to.dot(&up));
+        let lowest = if slope < 0.0 { (slope * (2.0 / facing).sqrt()).max(-1.0) } else { slope };
+        // A point at radius r whose height differs by d lies an arc of at least d from the segment's.
+        if height + length * lowest.min(0.0) - 3.0 * half > *gap {
+            return true;
+        }
+        // An obstacle at radius r has a slope of −height/r at most, so it lies an arc of r·lowest + height away, and r
+        // is at least `height`.
+        *half == 0.0 && lowest > 0.0 && height > 8.0 * rounding && lowest * height > 1.0001 * gap - height
+    }
+}
+
+/// What is in a box and above the highest point found so far.
+#[derive(Clone, Copy)]
+struct Above {
+    low: Vec3,
+    high: Vec3,
+    root: Vec3,
+    up: Vec3,
+    /// Height above the root of the highest point, metres.
+    rise: f64,
+    /// The same, rounded.
+    below: f32,
+    /// Rounding of heights here.
+    slack: f32,
+    reach: f32,
+}
+
+impl Region for Above {
+    #[inline(always)]
+    fn meeting(&self, boxes: &Boxes) -> u16 {
+        let mut mask = 0;
+        for lane in 0..LANES {
+            let mut meets = true;
+            let (mut height, mut size) = (self.slack, 0.0_f32);
+            for axis in 0..3 {
+                let (low, high) = (boxes.low[axis].0[lane], boxes.high[axis].0[lane]);
+                meets &= (low <= self.high[axis]) & (high >= self.low[axis]);
+                let along = (if self.up[axis] >= 0.0 { high } else { low }) - self.root[axis];
+                height += along * self.up[axis];
+                size += (low - self.root[axis]).abs() + (high - self.root[axis]).abs();
+            }
+            // Overflow meets.
+            let below = height + 1e-6 * size + 2e-14 * size * (size / self.reach) < self.below;
+            mask |= u16::from(meets & !below) << lane;
+        }
+        mask
+    }
+}
+
+impl Above {
+    #[inline(always)]
+    fn add_lanes(&mut self, block: &Block, mut lanes: u16, root: &DVec3) {
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            self.add(&super::crossing::corners(block, lane), root);
+        }
+    }
+
+    /// Adds a triangle. Its intersection with a circle of radius `reach` is computed in f64 to the square of its size.
+    #[inline(always)]
+    fn add(&mut self, corners: &[DVec3; 3], root: &DVec3) {
+        let up = to_f64(self.up);
+        for corner in corners {
+            let away = corner - root;
+            let size = away.x.abs() + away.y.abs() + away.z.abs();
+            let height = up.dot(&away) + 1e-14 * size * (1.0 + size / f64::from(self.reach));
+            self.rise = self.rise.max(height);
+        }
+        self.below = self.rise as f32;
+    }
+}
+
+#[cfg(test)]
+mod tests;
