@@ -198,8 +198,9 @@ impl Subject<'_> {
     /// Cooks the reference.
     pub(super) fn reference(&self, set: &[(String, String)]) -> Result<Cooked<Reference>, Stop> {
         let mut reference = Reference::default();
+        let measure = &self.norm.measure;
         let mut take = |one: &Delivered| {
-            reference.frames.insert(one.frame, one.geometry.clone());
+            reference.frames.insert(one.frame, Arc::new(measure.reads_of(&one.geometry)));
             Ok(())
         };
         match self.cook(set, &mut take)? {

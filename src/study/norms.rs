@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use engine::geometry::{CURVE_ID, Column, Component, Geometry, ID, Kind, Owner, Topology};
+use engine::geometry::{CURVE_ID, Column, Component, Geometry, ID, Kind, Owner, P, Topology};
 use engine::graph::Graph;
 use numerics::vector::to_f64;
 
@@ -130,6 +130,26 @@ impl Measure {
                 })?
             }
         })
+    }
+
+    /// The geometry with the attributes that it reads alone: all frames of a reference are held in memory.
+    pub(super) fn reads_of(&self, geometry: &Geometry) -> Geometry {
+        let mut read = Geometry::default();
+        if matches!(self, Self::Metric { .. }) {
+            return read;
+        }
+        let is_read = |name: &str| {
+            [P.name, ID.name, CURVE_ID.name].contains(&name) || matches!(self, Self::Attribute(own) if own == name)
+        };
+        for part in geometry.parts() {
+            let mut part = part.clone();
+            let all: Vec<_> = part.columns().map(|(owner, name, _)| (owner, name.clone())).collect();
+            for (owner, name) in all.iter().filter(|(_, name)| !is_read(name)) {
+                part.remove(*owner, name);
+            }
+            read.put(part);
+        }
+        read
     }
 
     /// Adds the differences of a frame of two results. Metrics are compared elsewhere.
@@ -370,6 +390,20 @@ mod tests {
         let bare = |count| Geometry::from(Component::points(vec![[0.0; 3]; count]));
         let refused = Measure::Points.compare(&bare(2), &bare(3), &mut found).unwrap_err();
         assert_eq!(refused, "one result has 2 points of the points, another 3");
+    }
+
+    #[test]
+    fn a_reference_keeps_only_what_the_norm_reads() {
+        let mut points = Component::points(vec![[0.0; 3]]);
+        points.set(ID, vec![3]).unwrap();
+        points.set(engine::geometry::V, vec![[1.0; 3]]).unwrap();
+        let names = |measure: Measure| -> Vec<String> {
+            let kept = measure.reads_of(&points.clone().into());
+            kept.parts().flat_map(Component::columns).map(|(_, name, _)| name.to_string()).collect()
+        };
+        assert_eq!(names(Measure::Points), ["P", "id"]);
+        assert_eq!(names(Measure::Attribute("v".into())), ["P", "id", "v"]);
+        assert!(names(Measure::Metric { node: "a".into(), metric: "b".into() }).is_empty());
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use engine::memory::size_text;
 
 use super::outcome::{Goal, Outcome};
+use super::search;
 use crate::numbers::short;
 
 /// Three significant digits: times and errors are not known to more.
@@ -27,6 +28,13 @@ pub(super) fn text(outcome: &Outcome) -> String {
         if frames == 1 { "" } else { "s" },
         if unit.is_empty() { String::new() } else { format!(" in{unit}") },
     );
+    if outcome.knobs.len() > 1 {
+        let settings = outcome.knobs.iter().fold(1_usize, |product, knob| product.saturating_mul(knob.values.len()));
+        let _ = match search::grid_size(&outcome.knobs) {
+            Some(size) => writeln!(text, "a grid of {size} settings"),
+            None => writeln!(text, "a search: {} of {settings} settings were cooked", outcome.runs.len()),
+        };
+    }
     let mut rows = vec![header(outcome)];
     rows.extend((0..outcome.runs.len()).map(|run| row(outcome, run)));
     align(&rows, &mut text);

@@ -287,6 +287,8 @@ fn several_knobs_make_a_grid_and_a_large_one_is_searched() {
     let searched = study(&bench, &["--knob", &a, "--knob", b, "--frames", "1", "--tolerance", "1"]);
     let runs = searched["runs"].as_array().unwrap().len();
     assert!((17..64).contains(&runs) && searched["pick"].is_number(), "{runs} runs");
+    let args = ["study", "g.json", "--knob", &a, "--knob", b, "--frames", "1", "--repeats", "1", "--quiet", "--fresh"];
+    assert!(bench.done(&args).contains("a search: 17 of 65 settings were cooked"));
 }
 
 #[test]
