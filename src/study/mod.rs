@@ -66,7 +66,7 @@ pub struct StudyArgs {
     /// Write all runs to this file as JSON; - writes them to stdout, and the table to stderr
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Folder for the plot NAME.svg, the graph NAME.tuned.jsonc and the runs NAME.study.json; created if missing
+    /// Folder for the plot NAME.svg, the graph NAME.tuned.jsonc and the runs NAME.study; created if missing
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
     /// Override a param (node.param=VALUE) or a control (name=VALUE) in all runs; repeatable
@@ -75,7 +75,7 @@ pub struct StudyArgs {
     /// Cook each setting this many times, one after the other in rounds, and take the least time [default: 3, fewer where a run takes seconds]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeats: Option<u32>,
-    /// Do not use the runs that NAME.study.json has
+    /// Do not use the runs that NAME.study has
     #[arg(long)]
     fresh: bool,
     /// Number of threads [default: the machine's]

@@ -1,4 +1,4 @@
-//! `NAME.study.json`: the runs of a study so far, so that an interrupted one goes on where it stopped.
+//! `NAME.study`: the runs of a study so far, so that an interrupted one goes on where it stopped.
 //!
 //! The runs are used only if everything that they depend on is the same: the graph, its files, the knobs, the frames, the
 //! norm, the threads and the program. Otherwise the file is written anew.
@@ -141,5 +141,5 @@ fn errors_of(value: &Value) -> Option<Errors> {
 
 /// Where the runs of an output's study are stored.
 pub(super) fn path(folder: &Path, output: &str) -> PathBuf {
-    folder.join(format!("{output}.study.json"))
+    folder.join(format!("{output}.study"))
 }

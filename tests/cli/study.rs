@@ -100,7 +100,7 @@ fn the_json_has_the_documented_keys_and_the_table_goes_to_stderr() {
     assert_eq!(runs[0]["nodes"]["ground"], json!(0.0), "a still source is read before the cook");
     let svg = String::from_utf8(bench.files("out").remove("grass.svg").unwrap()).unwrap();
     assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>\n") && svg.contains("time per frame (ms)"), "{svg}");
-    assert_eq!(bench.names("out"), ["grass.study.json", "grass.svg"]);
+    assert_eq!(bench.names("out"), ["grass.study", "grass.svg"]);
 }
 
 #[test]
@@ -296,7 +296,7 @@ fn finished_runs_are_kept_for_the_same_command_only() {
     let bench = Bench::with_graph(WALL);
     let run = |knob: &str| bench.run(&["study", "g.json", "--knob", knob, "--repeats", "1"]);
     let (first, again) = (run(STEPS), run(STEPS));
-    assert!(again.stderr.contains("4 runs are taken from `out/grass.study.json`"), "{}", again.stderr);
+    assert!(again.stderr.contains("4 runs are taken from `out/grass.study`"), "{}", again.stderr);
     assert_eq!(first.stdout, again.stdout, "times too");
     assert!(!run("bent.rotation_steps=4,8").stderr.contains("are taken from"));
     bench.write("g.json", &WALL.replace("2000", "1500"));
@@ -315,7 +315,7 @@ fn ctrl_c_writes_what_was_measured_and_the_same_command_goes_on() {
     assert_eq!(ran.code, Some(130), "{}", ran.stderr);
     assert!(ran.stderr.contains("interrupted; 4 runs are kept") && ran.stdout.contains("floor: "), "{}", ran.stderr);
     assert_eq!(bench.read_json("runs.json")["runs"].as_array().unwrap().len(), 4);
-    assert_eq!(bench.names("out"), ["grass.study.json", "grass.svg"], "and no temporaries");
+    assert_eq!(bench.names("out"), ["grass.study", "grass.svg"], "and no temporaries");
     let ran = bench.run(&["study", "g.json", "--knob", STEPS, "--repeats", "1"]);
     assert!(ran.stderr.contains("4 runs are taken from"), "{}", ran.stderr);
 }
