@@ -1,7 +1,8 @@
 //! Liquids on a sparse grid: cells stored row by row ([`rows`]) and loops over them ([`stencil`]), the pressure that
 //! keeps a liquid's volume ([`pressure`]), pressure and viscosity together ([`viscosity`]), the surface as a level set
 //! ([`level_set`]) made exact by markers ([`markers`], together [`marked`]) and as a mesh ([`extract`]), velocity on faces ([`velocity`]),
-//! meshes as sources and colliders ([`shape`]), the volume of each piece kept ([`volumes`]), points that it carries ([`carried`]),
+//! meshes as sources and colliders ([`shape`]), the volume of each piece and of each liquid in it kept ([`volumes`]), points that it
+//! carries ([`carried`]),
 //! their values at other points ([`tag`]), and all of it moved frame by frame ([`step`]). Functions take and return
 //! plain slices; nothing here depends on nodes or on the engine's geometry.
 //!
