@@ -2,9 +2,8 @@
 //! keeps a liquid's volume ([`pressure`]), pressure and viscosity together ([`viscosity`]), the surface as a level set
 //! ([`level_set`]) made exact by markers ([`markers`], together [`marked`]) and as a mesh ([`extract`]), velocity on faces ([`velocity`]),
 //! meshes as sources and colliders ([`shape`]), the volume of each piece and of each liquid in it kept ([`volumes`]), points that it
-//! carries ([`carried`]),
-//! their values at other points ([`tag`]), and all of it moved frame by frame ([`step`]). Functions take and return
-//! plain slices; nothing here depends on nodes or on the engine's geometry.
+//! carries ([`carried`]), their values at other points ([`tag`]), and all of it moved frame by frame ([`step`]). Functions take
+//! and return plain slices; nothing here depends on nodes or on the engine's geometry.
 //!
 //! As everywhere in [`numerics`], results have the same bits on any CPU and for any number of threads.
 
