@@ -195,9 +195,9 @@ metrics! { METRICS:
     MATERIAL_DRIFT = Metric::new("material_drift", Unit::None,
         "Where liquids of several viscosities or densities meet: the largest error of the share that one of them has of the \
             volume, relative to what it should be.")
-        .warn_outside(-1.0, 0.1, "Of one of the liquids that differ in viscosity or density there is too much or too little, by \
-            {material_drift} of what there should be: others took its place, or it took theirs. A layer thinner than a cell cannot be told \
-            from what is around it: use smaller cells.");
+        .warn_outside(-1.0, 0.1, "One of the liquids of different viscosity or density is off by {material_drift} of the volume that it \
+            should have: others took its place, or it took theirs. A layer thinner than a cell mixes with what is around it; use \
+            smaller cells.");
     SPRAY = Metric::new("spray", Unit::CubicMetres,
         "Volume of drops too small for the grid, which fly on their own as `spray` in `particles`.");
     EULER_CHARACTERISTIC = Metric::new("euler_characteristic", Unit::None,
