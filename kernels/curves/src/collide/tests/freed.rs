@@ -58,16 +58,7 @@ fn a_curve_is_blended_to_its_first_free_pose_towards_rest() {
     let (rest, goal) = ([[0.0, 0.1, 0.0], [0.0, 1.1, 0.0]], [[0.0, 0.1, 0.0], [1.0, 0.1, 0.0]]);
     let down = DVec3::new(1.0, -1.0, 0.0).normalize();
     let mut out = goal;
-    let mut hair = Hair {
-        first: 0,
-        shift: DVec3::zeros(),
-        half_space: None,
-        up: DVec3::zeros(),
-        rest: &rest,
-        goal: &goal,
-        out: &mut out,
-    };
-    assert!(hair.fall_back(&how, &[down]));
+    assert!(hair(&rest, &goal, &mut out).fall_back(&how, &[down]));
     let turned = |tip: Vec3| libm::atan2(f64::from(tip[0]), f64::from(tip[1]) - 0.1);
     let share = turned(out[1]) / 135_f64.to_radians();
     let most = (90_f64.to_radians() + libm::asin(0.1)) / 135_f64.to_radians();
@@ -75,15 +66,11 @@ fn a_curve_is_blended_to_its_first_free_pose_towards_rest() {
     // Where rest crosses too, nothing is done.
     let rest = [[0.0, 0.1, 0.0], [0.0, -0.9, 0.0]];
     let mut out = goal;
-    let mut hair = Hair {
-        first: 0,
-        shift: DVec3::zeros(),
-        half_space: None,
-        up: DVec3::zeros(),
-        rest: &rest,
-        goal: &goal,
-        out: &mut out,
-    };
-    assert!(!hair.fall_back(&how, &[down]));
+    assert!(!hair(&rest, &goal, &mut out).fall_back(&how, &[down]));
     assert_eq!(out, goal);
+}
+
+/// A curve without a half-space that is not displaced.
+fn hair<'a>(rest: &'a [Vec3], goal: &'a [Vec3], out: &'a mut [Vec3]) -> Hair<'a> {
+    Hair { first: 0, shift: DVec3::zeros(), half_space: None, up: DVec3::zeros(), rest, goal, out }
 }
