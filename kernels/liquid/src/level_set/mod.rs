@@ -189,6 +189,12 @@ impl LevelSet {
         }
     }
 
+    /// Makes cells air. Follow with [`Self::fill`].
+    pub(crate) fn take_out(&mut self, cells: &CellRows) {
+        let phi = &mut self.phi;
+        self.stencil.rows().for_each_shared(cells, |from, _, len| phi[from..from + len].fill(BAND));
+    }
+
     /// Makes the surface go on into a solid that it wets, to a depth of [`CONTACT`] cells, beyond which there is no liquid.
     /// `solid` is the distance from it, in cells, negative inside. φ goes on along the normal of the solid as it is
     /// [`ABOVE`] it, but does not fall towards the outside: a film thinner than a cell then has one surface, not two that

@@ -192,6 +192,15 @@ impl MarkedSurface {
         self.restrict();
     }
 
+    /// Takes out surface cells, whole pieces of the liquid, and their markers.
+    pub(crate) fn take_out(&mut self, cells: &CellRows, is_taken: impl Fn(u32) -> bool) {
+        self.set.take_out(cells);
+        let pieces = self.markers.pieces().to_vec();
+        self.markers.retain(|n| !is_taken(pieces[n]));
+        self.among_images(0.0, |_, set| set.fill());
+        self.restrict();
+    }
+
     /// Calls `f` with the surface and its images, `reach` cells and those that its distances need beyond the sides, and
     /// keeps what is inside the domain.
     fn among_images(&mut self, reach: f32, f: impl FnOnce(&mut Markers, &mut LevelSet)) {

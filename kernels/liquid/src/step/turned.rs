@@ -41,11 +41,9 @@ pub(super) fn carried(
     motion.rows().tabulate_with(
         || Sampler::new(&rows),
         |sampler, cell, at| {
-            [0, 1, 2].map(|axis| {
+            let mut carried = [0.0; 3];
+            for axis in (0..3).filter(|axis| motion.known[at] >> axis & 1 == 1) {
                 let own = motion.velocity.faces()[axis][at];
-                if motion.known[at] >> axis & 1 == 0 {
-                    return 0.0;
-                }
                 let middle = Site::FACES[axis].of(cell);
                 let mut sum =
                     along(sampler, &velocity[axis], axis, middle).clamp(-steepest, steepest) * gain.faces[axis][at];
@@ -54,8 +52,9 @@ pub(super) fn carried(
                     let slope = corners.slope(&velocity[other], axis);
                     sum += slope.clamp(-steepest, steepest) * corners.value(&gained[other]);
                 }
-                own + weight * sum
-            })
+                carried[axis] = own + weight * sum;
+            }
+            carried
         },
     )
 }

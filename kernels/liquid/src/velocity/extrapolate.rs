@@ -40,10 +40,43 @@ struct Gain<const F: usize> {
     values: [[f32; 3]; F],
 }
 
-/// Lines of a chunk, and whether faces are left unknown there.
-struct Chunk {
-    lines: Range<usize>,
-    open: bool,
+/// What the cells of neighbouring lines gained in a layer, and which of the lines did.
+struct Gains<const F: usize> {
+    cells: Vec<Gain<F>>,
+    lines: Vec<u32>,
+}
+
+/// The lines beside which, or in which, faces became known in the last layer: others gain nothing in the next.
+struct Front {
+    is_near: Vec<bool>,
+    /// The line of each cell.
+    line_of: Vec<u32>,
+}
+
+impl Front {
+    fn new(lines: &[Line]) -> Self {
+        let line_of = lines.iter().enumerate().flat_map(|(n, line)| std::iter::repeat_n(n as u32, line.len as usize));
+        Self { is_near: vec![true; lines.len()], line_of: line_of.collect() }
+    }
+
+    /// Goes on from the lines that gained.
+    fn advance<'a>(&mut self, lines: &[Line], gained: impl Iterator<Item = &'a u32>) {
+        self.is_near.fill(false);
+        for number in gained.map(|number| *number as usize) {
+            let line = &lines[number];
+            self.is_near[number] = true;
+            if line.joined[0] {
+                self.is_near[number - 1] = true;
+            }
+            if line.joined[1] {
+                self.is_near[number + 1] = true;
+            }
+            for row in PAIRS.map(|[near, _]| line.beside[near]).into_iter().filter(|row| *row != NONE) {
+                let [first, last] = [row, row + line.len - 1].map(|at| self.line_of[at as usize] as usize);
+                self.is_near[first..=last].fill(true);
+            }
+        }
+    }
 }
 
 /// Continues `fields` on `rows` from the faces `known` to all others that can be reached. Differences between faces one
@@ -62,16 +95,17 @@ pub fn extrapolate<const F: usize>(
     let fits = |faces: &&mut FaceFields<f32>| faces.iter().all(|field| field.len() == rows.len());
     assert!(known.len() == rows.len() && fields.iter().all(fits), "one value a cell");
     let lines = lines(rows);
-    let mut chunks = chunks(&lines);
+    let chunks = chunks(&lines);
+    let mut front = Front::new(&lines);
     for _ in 0..layers {
-        let gains: Vec<Vec<Gain<F>>> = {
+        let gains: Vec<Gains<F>> = {
             let layer = Layer { lines: &lines, known, fields: fields.each_ref().map(|faces| &**faces), steepest };
-            parallel::map(&mut chunks, |_, chunk| layer.gains(chunk))
+            parallel::map(&chunks, |_, chunk| layer.gains(chunk, &front.is_near))
         };
-        if gains.iter().all(Vec::is_empty) {
+        if gains.iter().all(|gains| gains.lines.is_empty()) {
             return;
         }
-        for gain in gains.iter().flatten() {
+        for gain in gains.iter().flat_map(|gains| &gains.cells) {
             let at = gain.at as usize;
             known[at] |= gain.faces;
             for (faces, values) in fields.iter_mut().zip(gain.values) {
@@ -82,6 +116,7 @@ pub fn extrapolate<const F: usize>(
                 }
             }
         }
+        front.advance(&lines, gains.iter().flat_map(|gains| &gains.lines));
     }
 }
 
@@ -93,22 +128,22 @@ struct Layer<'a, const F: usize> {
 }
 
 impl<const F: usize> Layer<'_, F> {
-    fn gains(&self, chunk: &mut Chunk) -> Vec<Gain<F>> {
-        let mut gains = Vec::new();
-        if !chunk.open {
-            return gains;
-        }
-        chunk.open = false;
+    fn gains(&self, chunk: &Range<usize>, is_near: &[bool]) -> Gains<F> {
+        let mut gains = Gains { cells: Vec::new(), lines: Vec::new() };
         let mut reached = Vec::new();
-        for line in &self.lines[chunk.lines.clone()] {
+        for number in chunk.clone().filter(|number| is_near[*number]) {
+            let line = &self.lines[number];
             let own = &self.known[line.at as usize..][..line.len as usize];
             if own.iter().fold(ALL_FACES, |all, mask| all & mask) == ALL_FACES {
                 continue;
             }
-            chunk.open = true;
             self.reach(line, own, &mut reached);
+            let before = gains.cells.len();
             for (n, faces) in reached.iter().enumerate().filter(|(_, faces)| **faces != 0) {
-                gains.push(self.gain(line, n, *faces));
+                gains.cells.push(self.gain(line, n, *faces));
+            }
+            if gains.cells.len() > before {
+                gains.lines.push(number as u32);
             }
         }
         gains
@@ -220,13 +255,13 @@ fn base_at(row: &mut &[RowSpan], x: i32) -> (u32, i32) {
     }
 }
 
-fn chunks(lines: &[Line]) -> Vec<Chunk> {
+fn chunks(lines: &[Line]) -> Vec<Range<usize>> {
     let mut chunks = Vec::new();
     let mut first = 0;
     for number in 0..lines.len() {
         let next = lines.get(number + 1);
         if next.is_none_or(|next| next.at as usize / CHUNK != lines[first].at as usize / CHUNK) {
-            chunks.push(Chunk { lines: first..number + 1, open: true });
+            chunks.push(first..number + 1);
             first = number + 1;
         }
     }

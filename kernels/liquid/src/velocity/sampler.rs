@@ -54,11 +54,8 @@ impl Corners {
     /// The eight values, x fastest.
     #[inline(always)]
     pub fn values<T: Copy>(&self, field: &[T]) -> [T; 8] {
-        let [a, b, c, d] = self.at.map(|at| {
-            let second = field[at as usize + 1];
-            [field[at as usize], second]
-        });
-        [a[0], a[1], b[0], b[1], c[0], c[1], d[0], d[1]]
+        let [a, b, c, d] = self.at.map(|at| at as usize);
+        [field[a], field[a + 1], field[b], field[b + 1], field[c], field[c + 1], field[d], field[d + 1]]
     }
 
     /// The value at the point.

@@ -157,10 +157,11 @@ impl VolumeTargets {
             let around = found.cells_around(new, BESIDE as i32);
             let mut votes = vec![0; self.pieces.len()];
             let markers = surface.markers();
-            for (marker, old) in markers.markers.iter().zip(markers.pieces()) {
-                if *old != NO_PIECE && around.find(marker.point.map(floor)).is_some() {
-                    votes[*old as usize] += 1;
-                }
+            let Some((low, high)) = around.bounds() else { continue };
+            for (marker, old) in markers.markers.iter().zip(markers.pieces()).filter(|(_, old)| **old != NO_PIECE) {
+                let cell = marker.point.map(floor);
+                let is_near = (0..3).all(|axis| low[axis] <= cell[axis] && cell[axis] < high[axis]);
+                votes[*old as usize] += usize::from(is_near && around.find(cell).is_some());
             }
             match (0..votes.len()).rev().max_by_key(|old| votes[*old]).filter(|old| votes[*old] > 0) {
                 Some(old) => passages.push(Passage { old, new, markers: 1 }),
@@ -178,9 +179,7 @@ impl VolumeTargets {
             let own = markers.markers.iter().zip(markers.pieces()).filter(|(_, of)| **of as usize == old);
             let (sum, count) = own.fold(([0.0; 3], 0.0), |(sum, n), (marker, _)| (add(sum, marker.point), n + 1.0));
             let place = if count > 0.0 { scale(sum, size / count) } else { piece.place };
-            let of_phase =
-                move |(phase, volume): (usize, &f64)| LostPiece { volume: *volume, phase: phase as u32, place };
-            piece.phases.iter().enumerate().map(of_phase).collect::<Vec<_>>()
+            piece.lost(place).collect::<Vec<_>>()
         };
         self.pieces.iter().enumerate().filter(|(old, _)| is_lost[*old]).flat_map(lost).collect()
     }

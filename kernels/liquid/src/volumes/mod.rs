@@ -3,7 +3,7 @@
 //!
 //! A piece is liquid that the mesh does not part; bubbles belong to the piece around them. Markers tell where its liquid
 //! went: pieces that merge add up their targets, and one that splits shares its target by what the parts enclose. A piece
-//! that got too small for the grid is lost, with its target, to whoever carries it on.
+//! that got too small for the grid, [`SMALLEST`] or nothing at all, is lost, with its target, to whoever carries it on.
 //!
 //! Liquids that do not mix are phases of a piece ([`LiquidMaterial`]); each has a target of its own. Two ways lead to it: what a
 //! piece lacks in all comes back where the phases that lack it are at its surface, and what one phase took from another is
@@ -59,6 +59,8 @@ const ROUNDED: f64 = 0.04;
 const LEAST_EXCHANGED: f64 = 1e-3;
 /// Frames' worth of moves that the surface of the start may take to enclose a known volume.
 const START_MOVES: u32 = 3;
+/// Volume, in surface cells, below which a piece is too small for the grid: its surface would be lost and given back each frame.
+const SMALLEST: f64 = 1.0;
 /// Distance, in surface cells, from which liquid that is added belongs to no piece.
 const BESIDE: f32 = 4.0;
 
@@ -81,6 +83,12 @@ impl PieceTarget {
 
     fn of_phase(&self, phase: usize) -> f64 {
         self.phases.get(phase).copied().unwrap_or_default()
+    }
+
+    /// What is lost with it at a place in solver cells.
+    fn lost(&self, place: Vec3) -> impl Iterator<Item = LostPiece> {
+        let of_phase = move |(phase, volume): (usize, &f64)| LostPiece { volume: *volume, phase: phase as u32, place };
+        self.phases.iter().enumerate().map(of_phase).filter(|piece| piece.volume > 0.0)
     }
 }
 
@@ -278,6 +286,7 @@ impl VolumeTargets {
             lost.extend(vanished);
             found = now;
         }
+        lost.extend(self.drop_small(&mut found, surface, solid));
         let report = self.report(&found, unit, moved, lost);
         VolumeReport { corrected_now: self.corrected - before, ..report }
     }
@@ -331,8 +340,32 @@ impl VolumeTargets {
         solid: Option<&Distance<'_>>,
         phases: Option<&PhaseShares>,
     ) -> VolumeReport {
-        let (found, lost) = self.follow(surface, solid, phases);
+        let (mut found, mut lost) = self.follow(surface, solid, phases);
+        lost.extend(self.drop_small(&mut found, surface, solid));
         self.report(&found, self.unit(surface), 0.0, lost)
+    }
+
+    /// Takes the pieces out of a surface that are too small for its cells.
+    fn drop_small(
+        &mut self,
+        found: &mut Pieces,
+        surface: &mut MarkedSurface,
+        solid: Option<&Distance<'_>>,
+    ) -> Vec<LostPiece> {
+        let unit = self.unit(surface);
+        let is_small = |(target, piece): (&PieceTarget, &Measured)| {
+            let volume = target.volume() / unit;
+            piece.volume < SMALLEST && volume < SMALLEST && volume > 0.0
+        };
+        let small: Vec<bool> = self.pieces.iter().zip(&found.all).map(is_small).collect();
+        let mut lost = Vec::new();
+        for piece in found.take_out(surface, solid, &small) {
+            let target = &mut self.pieces[piece];
+            lost.extend(target.lost(target.place));
+            target.phases.fill(0.0);
+            target.measured = 0.0;
+        }
+        lost
     }
 
     fn report(&self, found: &Pieces, unit: f64, moved: f64, lost: Vec<LostPiece>) -> VolumeReport {
@@ -347,7 +380,7 @@ impl VolumeTargets {
             raw_drift: share(volume - self.corrected - target),
             corrected: self.corrected,
             corrected_now: 0.0,
-            pieces: found.all.len(),
+            pieces: found.all.iter().filter(|piece| piece.volume > 0.0).count(),
             worst: errors.fold(0.0, |worst, error| worst.max(error.abs())),
             phase_drift: self.phase_drift(found),
             moved,

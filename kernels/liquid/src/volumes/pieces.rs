@@ -23,6 +23,8 @@ const DESCENT: usize = 5;
 const SAME: f64 = 0.1;
 /// Bounds of how much a volume changes ÷ area · way.
 const RESPONSES: [f64; 2] = [0.5, 4.0];
+/// Distance from a solid, in cells, from which a piece is not beside it.
+const CLEAR: f32 = 2.0;
 /// φ of cells that hold some liquid is below, in cells.
 pub(super) const HOLDS: f32 = 0.5;
 
@@ -185,20 +187,26 @@ impl Pieces {
         closest
     }
 
+    fn cells_of(&self, piece: usize) -> Vec<Cell> {
+        let own = self.inside.spans().filter(|(_, span)| self.of_span[span.base as usize] as usize == piece);
+        own.flat_map(|([y, z], span)| (span.start..span.end).map(move |x| [x, y, z])).collect()
+    }
+
     /// The cells of a piece and those at most `by` away.
     pub(super) fn cells_around(&self, piece: usize, by: i32) -> CellRows {
-        self.inside.filtered(|cell, _| self.of_cell(cell) == Some(piece as u32)).dilated(by)
+        CellRows::from_cells(&self.cells_of(piece)).dilated(by)
     }
 
     /// Moves the surface of each phase of each piece, which its markers know, outward by one of `ways`, in cells.
     pub(super) fn shift(&self, surface: &mut MarkedSurface, ways: &Ways, phases: Option<&PhaseShares>) {
         let view = surface.view_of(self.clipped.as_deref());
         let (phi, by) = (surface.level_set().phi(), 1.0 / surface.resolution() as f32);
-        let start = || (Finder::new(view.rows), phases.map(PhaseShares::reader));
-        let [cells] = view.rows.tabulate_with(start, |(finder, reader), cell, at| {
-            let piece = if phi[at].abs() < NEAR { self.downhill(view, finder, cell) } else { None };
+        let (pieces, below) = (self.of_cells(view.rows), self.downhill(view, phi));
+        let start = || phases.map(PhaseShares::reader);
+        let [cells] = view.rows.tabulate_with(start, |reader, cell, at| {
+            let piece = if phi[at].abs() < NEAR { descend(&pieces, &below, at) } else { NO_PIECE };
             let middle = || cell.map(|x| (x as f32 + 0.5) * by);
-            [piece.map_or(0.0, |piece| ways.at(piece, reader.as_mut(), middle))]
+            [ways.at(piece, reader.as_mut(), middle)]
         });
         let (markers, pieces) = (&surface.markers().markers, surface.markers().pieces());
         let of_marker = |reader: &mut Option<PhaseReader<'_>>, n: usize| {
@@ -209,33 +217,100 @@ impl Pieces {
         surface.shift(&cells, &markers);
     }
 
-    /// The piece that the steepest way down φ leads to from a cell.
-    fn downhill(&self, view: PhiView<'_>, finder: &mut Finder<'_>, cell: Cell) -> Option<u32> {
-        let mut at = cell;
-        for _ in 0..DESCENT {
-            if let Some(piece) = self.of_cell(at) {
-                return Some(piece);
+    /// Takes pieces out of a surface, but for those beside a solid: their liquid goes on in it, and would come back from there.
+    /// Returns those taken, which then enclose nothing.
+    pub(super) fn take_out(
+        &mut self,
+        surface: &mut MarkedSurface,
+        solid: Option<&Distance<'_>>,
+        which: &[bool],
+    ) -> Vec<usize> {
+        let size = surface.resolution() as f32;
+        let is_clear = |cell: &Cell| {
+            let middle = cell.map(|x| (x as f32 + 0.5) / size);
+            solid.is_none_or(|solid| size * solid(middle) > CLEAR)
+        };
+        let mut own = vec![Vec::new(); which.len()];
+        for ([y, z], span) in self.inside.spans() {
+            let piece = self.of_span[span.base as usize] as usize;
+            if which[piece] {
+                own[piece].extend((span.start..span.end).map(|x| [x, y, z]));
             }
-            let mut phi = |cell: Cell| finder.find(cell).map_or(view.outside, |at| view.phi[at]);
-            let own = phi(at);
-            let (mut steepest, mut next) = (0.0, at);
-            for n in (0..27).filter(|n| *n != 13) {
-                let (x, y, z) = (n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-                let cell = [at[0] + x, at[1] + y, at[2] + z];
-                let inverse_length =
-                    [0.0, 1.0, FRAC_1_SQRT_2, 0.577_350_26][[x, y, z].iter().filter(|n| **n != 0).count()];
-                let slope = (phi(cell) - own) * inverse_length;
-                if slope < steepest && contains(view, cell) {
-                    (steepest, next) = (slope, cell);
-                }
-            }
-            if next == at {
-                return None;
-            }
-            at = next;
         }
-        self.of_cell(at)
+        own.iter_mut().filter(|cells| !cells.iter().all(is_clear)).for_each(Vec::clear);
+        let taken: Vec<usize> = (0..own.len()).filter(|piece| !own[*piece].is_empty()).collect();
+        if !taken.is_empty() {
+            let is_taken = |piece: u32| own.get(piece as usize).is_some_and(|cells| !cells.is_empty());
+            surface.take_out(&CellRows::from_cells(&own.concat()), is_taken);
+        }
+        for piece in &taken {
+            self.all[*piece] = Measured { place: self.all[*piece].place, ..Measured::default() };
+        }
+        taken
     }
+
+    /// The piece of each of these cells; [`NO_PIECE`] outside.
+    fn of_cells(&self, rows: &CellRows) -> Vec<u32> {
+        let mut pieces = vec![NO_PIECE; rows.len()];
+        for ([y, z], span) in self.inside.spans() {
+            let first = rows.find([span.start, y, z]).expect("cells inside are stored");
+            pieces[first..first + span.len()].fill(self.of_span[span.base as usize]);
+        }
+        pieces
+    }
+
+    /// Of each cell outside a piece that a shift may move, the cell of those around to which φ falls steepest; of others, and
+    /// where it falls nowhere, the cell itself.
+    fn downhill(&self, view: PhiView<'_>, phi: &[f32]) -> Vec<u32> {
+        // A way down passes cells whose φ outside solids is less, but whose own is not near the surface.
+        let is_passed = |at: usize| view.phi[at] >= 0.0 && (self.clipped.is_some() || phi[at] < NEAR);
+        let [below] = view.rows.tabulate_with(
+            || Finder::new(view.rows),
+            |finder, cell, at| {
+                let (mut steepest, mut below) = (0.0, at);
+                if !is_passed(at) {
+                    return [at as u32];
+                }
+                for (by, inverse_length) in &AROUND {
+                    let beside = [cell[0] + by[0], cell[1] + by[1], cell[2] + by[2]];
+                    let Some(beside_at) = finder.find(beside) else { continue };
+                    let slope = (view.phi[beside_at] - view.phi[at]) * inverse_length;
+                    if slope < steepest && contains(view, beside) {
+                        (steepest, below) = (slope, beside_at);
+                    }
+                }
+                [below as u32]
+            },
+        );
+        below
+    }
+}
+
+/// The cells around one, x fastest, and 1 ÷ how far they are.
+const AROUND: [([i32; 3], f32); 26] = {
+    let (mut around, mut n, mut count) = ([([0; 3], 1.0); 26], 0, 0);
+    while n < 27 {
+        let by = [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1];
+        let axes = by[0] * by[0] + by[1] * by[1] + by[2] * by[2];
+        if axes > 0 {
+            around[count] = (by, [0.0, 1.0, FRAC_1_SQRT_2, 0.577_350_26][axes as usize]);
+            count += 1;
+        }
+        n += 1;
+    }
+    around
+};
+
+/// The piece to which the steepest way down φ leads from a cell.
+fn descend(pieces: &[u32], below: &[u32], mut at: usize) -> u32 {
+    for _ in 0..DESCENT {
+        let next = below[at] as usize;
+        if pieces[at] != NO_PIECE || next == at {
+            break;
+        }
+        at = next;
+    }
+    pieces[at]
 }
 
 fn contains(view: PhiView<'_>, cell: Cell) -> bool {

@@ -150,6 +150,32 @@ fn a_piece_that_vanishes_is_lost_with_its_volume() {
 }
 
 #[test]
+fn a_piece_smaller_than_a_cell_is_lost_with_its_volume_but_not_beside_a_solid() {
+    let at = [14.5, 14.5, 10.5];
+    let pool_and_drop = |radius: f32| move |p: Vec3| (p[1] - 6.0).min(ball(at, radius)(p));
+    let begin = |radius| start([24, 20, 20], pool_and_drop(radius));
+    let is_drop = |piece: &&PieceTarget| length(sub(piece.place, at)) < 0.5;
+    let (mut surface, mut targets) = begin(0.6);
+    let before = sum(&targets);
+    let drop = targets.pieces().iter().find(is_drop).unwrap().volume();
+    assert!((0.01..SMALLEST).contains(&drop), "{drop}");
+    let report = targets.correct(&mut surface, None);
+    let [lost] = &report.lost[..] else { panic!("{report:?}") };
+    assert!(lost.volume == drop && length(sub(lost.place, at)) < 0.1, "{lost:?}");
+    assert_near(sum(&targets) + lost.volume, before, 1e-12);
+    assert_near(report.volume, before - drop, 1e-12);
+    assert!(report.pieces == 1 && surface.markers().markers.iter().all(|marker| marker.point[1] < 8.0));
+    assert_eq!(targets.correct(&mut surface, None).lost, []);
+    assert_eq!(targets.pieces().len(), 1);
+    // A solid next to it; and a larger drop.
+    let (mut surface, mut targets) = begin(0.6);
+    let solid = |p: Vec3| length(sub(p, [14.5, 12.5, 10.5])) - 1.0;
+    assert!(targets.correct(&mut surface, Some(&solid)).lost.is_empty());
+    let (mut surface, mut targets) = begin(1.3);
+    assert!(targets.correct(&mut surface, None).lost.is_empty());
+}
+
+#[test]
 fn what_fills_a_box_is_not_lost() {
     let (mut surface, mut targets) = start([12; 3], |_| -5.0);
     assert_near(sum(&targets), 1728.0, 1e-6);
