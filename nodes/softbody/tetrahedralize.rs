@@ -12,8 +12,9 @@
 //!   ends where the yolk begins. The inside is where the surface has winding number 1.
 //! * Some edges of the surface may not be edges of tets. No list of them is stored: the output includes the surface,
 //!   and [`bodies::tets::missing_edges`] finds them, so the two cannot become inconsistent.
-//! * Slivers, flat tets without a meaningful volume, are kept, as their edges are good springs, and are marked
-//!   `sliver`.
+//! * Slivers, flat tets without a meaningful volume, are flipped or moved away, or taken away where they lie on a flat
+//!   part of the surface. What remains, mostly below two triangles of the surface, is kept, as its edges are good
+//!   springs, and marked `sliver`.
 
 use std::collections::BTreeSet;
 
@@ -78,7 +79,11 @@ metrics! { METRICS:
         .warn_above(0.0,
         "These points of the surface belong to no tet, so they are connected only by springs along the surface. Look \
          for thin spikes and doubled walls, and thicken or remove them.");
-    SLIVERS = Metric::new("slivers", Unit::None, "Tets too flat to have a meaningful volume.");
+    SLIVERS = Metric::new("slivers", Unit::None,
+        "Tets too flat to have a meaningful volume, which only hold springs.");
+    SLIVER_SHARE = Metric::new("sliver_share", Unit::None, "`slivers` relative to `tets`.")
+        .warn_above(0.02, "Many tets are too flat to preserve their volume: where they lie, the body is held by springs \
+            alone. Set `interior`, or give the surface smaller and more even faces where it is thin.");
     REPAIRS = Metric::new("repairs", Unit::None,
         "Number of points merged or removed, and of faces removed, trimmed or reoriented.");
     LOST_PIECES = Metric::new("lost_pieces", Unit::None,
@@ -89,7 +94,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Tetrahedralize",
-    1,
+    2,
     "Fills closed surfaces with tets, so that they can be simulated as soft bodies. By default inner points are about \
      as far apart as those of the surface. Points get the attributes `surface_point`, the index of the corresponding \
      point of the surface (−1 inside), and `side`: 1 on the outside of a body, 2 on the wall of a cavity, 0 inside. \
@@ -176,6 +181,7 @@ fn publish(cx: &Cx, mesh: &Component, closed: &ClosedSurface, solid: &TetMesh) {
     cx.publish(MISSING_EDGES, measured.missing_edges as f64);
     cx.publish(BARE_POINTS, measured.bare_points as f64);
     cx.publish(SLIVERS, measured.slivers as f64);
+    cx.publish(SLIVER_SHARE, measured.slivers as f64 / (solid.tets.len().max(1)) as f64);
     cx.publish(REPAIRS, closed.changes.count() as f64);
     cx.publish(LOST_PIECES, lost_pieces(mesh, closed) as f64);
 }

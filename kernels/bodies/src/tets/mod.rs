@@ -20,6 +20,7 @@ mod delaunay;
 mod edges;
 mod enclosure;
 pub mod grid;
+mod improve;
 mod insertion_order;
 mod interior;
 mod predicates;

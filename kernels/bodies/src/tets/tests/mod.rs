@@ -2,6 +2,7 @@
 
 mod complex;
 mod predicates;
+mod slivers;
 mod solids;
 mod surfaces;
 
