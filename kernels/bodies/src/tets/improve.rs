@@ -153,8 +153,11 @@ impl<'a> Improver<'a> {
             return true;
         }
         let on_surface = self.surface.points;
-        let inner = corners.into_iter().filter(|corner| *corner as usize >= on_surface);
-        inner.fold(false, |moved, corner| self.relocate(corner) || moved)
+        let mut moved = false;
+        for corner in corners.into_iter().filter(|corner| *corner as usize >= on_surface) {
+            moved |= self.relocate(corner);
+        }
+        moved
     }
 
     fn at(&self, point: u32) -> DVec3 {

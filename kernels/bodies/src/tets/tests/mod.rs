@@ -1,5 +1,6 @@
 //! Tests of tetrahedralisation, and the exact checks they share.
 
+mod cages;
 mod complex;
 mod predicates;
 mod slivers;

@@ -87,7 +87,7 @@ fn flatness(solid: &TetMesh, tet: &[u32; 4]) -> f64 {
     let at = tet.map(|corner| to_f64(solid.points[corner as usize]));
     let longest =
         (0..4).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| (at[i] - at[j]).norm()).fold(0.0, f64::max);
-    (at[1] - at[0]).dot(&(at[2] - at[0]).cross(&(at[3] - at[0]))) * 2.0_f64.sqrt() / longest.powi(3)
+    (at[1] - at[0]).dot(&(at[2] - at[0]).cross(&(at[3] - at[0]))) * 2.0_f64.sqrt() / (longest * longest * longest)
 }
 
 #[test]
