@@ -14,7 +14,7 @@
 use engine::prelude::*;
 
 use crate::shared::attributes::{
-    BODY_NUMBER, GOAL_FRAME, GOAL_HOLD, GOAL_START, GOAL_STRENGTH, PIN_RADIUS, PIN_RELEASE, PIN_STRENGTH, SLIVER,
+    BODY_NUMBER, FILL, GOAL_FRAME, GOAL_HOLD, GOAL_START, GOAL_STRENGTH, PIN_RADIUS, PIN_RELEASE, PIN_STRENGTH, SLIVER,
     SURFACE_POINT,
 };
 use run::Run;
@@ -270,6 +270,7 @@ pub(crate) static NODE: Node = Node::new(
     &P,
     &SURFACE_POINT,
     &SLIVER,
+    &FILL,
     &BODY_NUMBER,
     &GOAL_FRAME,
     &GOAL_START,

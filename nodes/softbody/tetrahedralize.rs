@@ -12,16 +12,30 @@
 //!   ends where the yolk begins. The inside is where the surface has winding number 1.
 //! * Some edges of the surface may not be edges of tets. No list of them is stored: the output includes the surface,
 //!   and [`bodies::tets::missing_edges`] finds them, so the two cannot become inconsistent.
-//! * Slivers, flat tets without a meaningful volume, are kept, as their edges are good springs, and are marked
-//!   `sliver`.
+//! * Slivers, flat tets without a meaningful volume, are flipped or moved away, or taken away where they lie on a flat
+//!   part of the surface. What remains, mostly below two triangles of the surface, is kept, as its edges are good
+//!   springs, and marked `sliver`.
+//! * R needs a closed surface. `method` `cage` takes any: the tets are those of a lattice around the surface, which rides
+//!   along in them ([`bodies::tets::CagedSurface`]).
 
 use std::collections::BTreeSet;
 
-use bodies::tets::{ClosedSurface, FillSettings, PolygonSurface, ShellSide, SurfaceFault, TetMesh};
+use bodies::embedding::nearest_points;
+use bodies::tets::{Cage, CagedSurface, ClosedSurface, FillSettings, PolygonSurface, ShellSide, SurfaceFault, TetMesh};
 use engine::prelude::*;
 
-use crate::shared::attributes::{BODY_NUMBER, SLIVER, SURFACE_POINT};
+use crate::shared::attributes::{BODY_NUMBER, FILL, SLIVER, SURFACE_POINT};
 use crate::shared::pieces::pieces;
+
+choice! {
+    /// How the tets are made.
+    enum Method {
+        Delaunay = "delaunay": "Delaunay tets between the points of the surface and inner points. The surface must be \
+                    closed and must not cross itself; it is the surface of the tets",
+        Cage = "cage": "the tets of a regular lattice around and inside any surface: open, crossing itself, with several \
+                faces at an edge. The surface rides along in them. Parts closer together than `spacing` are joined",
+    }
+}
 
 choice! {
     /// The repair of an invalid surface.
@@ -36,24 +50,32 @@ choice! {
 inputs! { INPUTS:
     SURFACE: Input = Input::one("surface", Kind::Mesh,
         "Closed surfaces, one per body. A surface within another one is the wall of a cavity, and one within a cavity \
-         is a body again. Coarse faces make a coarse body.");
+         is a body again. Coarse faces make a coarse body. With `method` `cage` any mesh: what its faces run around \
+         once or more is inside (a wall of a cavity has to face into it), holes count as closed, and sheets are as thick \
+         as a tet.");
+    CARRY: Input<Opt> = Input::optional("carry", Kind::Mesh,
+        "A mesh that rides along in the tets instead of `surface`, such as a finer version of it.");
 }
 
 params! { PARAMS:
+    METHOD: Param<Method> = Param::choice("method", Method::Delaunay, "How the tets are made.");
     SPACING: Param<f64> = Param::double("spacing", 0.0,
-        "Approximate distance between inner points. 0 takes the mean edge length of the surface. Half the distance \
-         makes eight times as many points.")
-        .unit(Unit::Metres).at_least(0.0).soft(0.0, 1.0).when(|params| params.get(INTERIOR));
+        "Approximate distance between inner points, and the size of a cage's tets. 0 takes the mean edge length of the \
+         surface. Half the distance makes eight times as many points.")
+        .unit(Unit::Metres).at_least(0.0).soft(0.0, 1.0)
+        .when(|params| params.get(INTERIOR) || params.get(METHOD) == Method::Cage);
     INTERIOR: Param<bool> = Param::bool("interior", true,
-        "Whether to add inner points. Without them all tets reach from surface to surface and are few, long and thin.");
-    REPAIR: Param<Repair> = Param::choice("repair", Repair::Safe, "How an invalid surface is repaired.");
+        "Whether to add inner points. Without them all tets reach from surface to surface and are few, long and thin.")
+        .when(|params| params.get(METHOD) == Method::Delaunay);
+    REPAIR: Param<Repair> = Param::choice("repair", Repair::Safe,
+        "How an invalid surface is repaired. For a cage, `safe` only orients connected faces alike.");
 }
 
 const TETS: Output = Output::new(
     "tets",
     &[Kind::Tets, Kind::Mesh],
-    "The tets, together with the repaired surface mesh, whose points are the first points of the tets, in the same \
-     order.",
+    "The tets, together with the mesh that rides along: `carry`; or the surface of a cage; or the repaired surface, \
+     whose points are the first points of the tets, in the same order.",
 );
 
 /// 0 inside, 1 on the outside of a body, 2 on the wall of a cavity.
@@ -78,7 +100,11 @@ metrics! { METRICS:
         .warn_above(0.0,
         "These points of the surface belong to no tet, so they are connected only by springs along the surface. Look \
          for thin spikes and doubled walls, and thicken or remove them.");
-    SLIVERS = Metric::new("slivers", Unit::None, "Tets too flat to have a meaningful volume.");
+    SLIVERS = Metric::new("slivers", Unit::None,
+        "Tets too flat to have a meaningful volume, which only hold springs.");
+    SLIVER_SHARE = Metric::new("sliver_share", Unit::None, "`slivers` relative to `tets`.")
+        .warn_above(0.02, "Many tets are too flat to preserve their volume: where they lie, the body is held by springs \
+            alone. Set `interior`, or give the surface smaller and more even faces where it is thin.");
     REPAIRS = Metric::new("repairs", Unit::None,
         "Number of points merged or removed, and of faces removed, trimmed or reoriented.");
     LOST_PIECES = Metric::new("lost_pieces", Unit::None,
@@ -89,12 +115,15 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Tetrahedralize",
-    1,
-    "Fills closed surfaces with tets, so that they can be simulated as soft bodies. By default inner points are about \
-     as far apart as those of the surface. Points get the attributes `surface_point`, the index of the corresponding \
-     point of the surface (−1 inside), and `side`: 1 on the outside of a body, 2 on the wall of a cavity, 0 inside. \
-     Tets get `body`, the number of their body from 0, and `sliver`, 1 if the tet is too flat to have a meaningful \
-     volume. The output includes the surface mesh.",
+    2,
+    "Fills closed surfaces with tets, or any surface with a cage of them, so that they can be simulated as soft bodies. By \
+     default inner points are about as far apart as those of the surface. Points get the attributes `surface_point`, the \
+     index of the corresponding point of the surface (−1 inside, in a cage, and with `carry`), and `side`: 1 on the \
+     outside of a body, 2 on the wall of a cavity, 0 inside. Tets get `body`, the number of their body from 0, and \
+     `sliver`, 1 if the tet is too flat to have a meaningful volume; in a cage also `fill`, the share of the tet inside \
+     the surface, by which Softbody scales mass and stiffness. Point attributes of the surface are carried to the points \
+     of the tets, inside from the nearest point of the surface, so that they can mask params of Softbody. The output \
+     includes the mesh that rides along.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -102,7 +131,7 @@ pub(crate) static NODE: Node = Node::new(
 .accuracy(&[Accuracy::smaller("spacing", Trials::Times(&[4.0, 2.0, 1.0]))])
 .outputs(&[&TETS])
 .reads(&[&P])
-.writes(&[&P, &SURFACE_POINT, &SIDE, &BODY_NUMBER, &SLIVER])
+.writes(&[&P, &SURFACE_POINT, &SIDE, &BODY_NUMBER, &SLIVER, &FILL])
 .metrics(METRICS)
 .leaves_out(leaves_out)
 .changes_topology();
@@ -111,24 +140,48 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let mesh = cx.part(SURFACE);
     let faces = mesh.faces().expect("a mesh has faces");
     let surface = PolygonSurface { starts: faces.runs.starts(), corners: &faces.corners, points: mesh.positions() };
-    let closed = ClosedSurface::of(&surface, cx.get(REPAIR) == Repair::Safe).map_err(refusal)?;
-    cx.check_cancelled()?;
-    let fill = FillSettings { spacing: cx.get(SPACING), interior: cx.get(INTERIOR) };
-    let bytes = closed.fill_bytes(&fill).map_err(refusal)?;
-    cx.reserve(bytes, "raise `spacing`, fill fewer bodies, or raise --memory")?;
-    let solid = closed.fill(&fill).map_err(refusal)?;
-    publish(cx, mesh, &closed, &solid);
-    let repaired = repaired(mesh, &closed)?;
-    Ok(TETS.with(Geometry::from(tets(cx, &closed, solid)?).with(repaired)))
+    let safe = cx.get(REPAIR) == Repair::Safe;
+    let (tets, own) = match cx.get(METHOD) {
+        Method::Cage => (caged(cx, mesh, surface, safe)?, mesh.clone()),
+        Method::Delaunay => {
+            let closed = ClosedSurface::of(&surface, safe).map_err(refusal)?;
+            cx.check_cancelled()?;
+            let fill = FillSettings { spacing: cx.get(SPACING), interior: cx.get(INTERIOR) };
+            let bytes = closed.fill_bytes(&fill).map_err(refusal)?;
+            cx.reserve(bytes, "raise `spacing`, fill fewer bodies, or raise --memory")?;
+            let solid = closed.fill(&fill).map_err(refusal)?;
+            publish(cx, mesh, &closed, &solid);
+            let repaired = repaired(mesh, &closed)?;
+            let on_surface = if cx.part(CARRY).is_some() { 0 } else { closed.points.len() };
+            (tets(cx, &repaired, solid, on_surface)?, repaired)
+        }
+    };
+    let along = cx.part(CARRY).cloned().unwrap_or(own);
+    Ok(TETS.with(Geometry::from(tets).with(along)))
 }
 
-/// The bodies with the attributes that the node writes.
-fn tets(cx: &Cx, closed: &ClosedSurface, solid: TetMesh) -> Result<Component> {
+/// The cage of any surface.
+fn caged(cx: &Cx, mesh: &Component, surface: PolygonSurface<'_>, orient: bool) -> Result<Component> {
+    let caged = CagedSurface::of(surface, cx.get(SPACING), orient).map_err(refusal)?;
+    cx.reserve(caged.fill_bytes(), "raise `spacing`, fill fewer bodies, or raise --memory")?;
+    cx.check_cancelled()?;
+    let Cage { tets: solid, fill, bodies } = caged.fill();
+    publish_tets(cx, &solid, bodies);
+    let mut tets = tets(cx, mesh, solid, 0)?;
+    if cx.wants(FILL) {
+        tets.set(FILL, fill)?;
+    }
+    Ok(tets)
+}
+
+/// The bodies with the attributes that the node writes, and those of the points of `mesh`. The first `on_surface` points
+/// are those of the mesh that rides along.
+fn tets(cx: &Cx, mesh: &Component, solid: TetMesh, on_surface: usize) -> Result<Component> {
     let mut tets = Component::tets(solid.tets, solid.points)?;
+    carry_attributes(cx, &mut tets, mesh)?;
     if cx.wants(SURFACE_POINT) {
-        let of_surface = closed.points.len() as i32;
-        let points = 0..tets.point_count() as i32;
-        tets.set(SURFACE_POINT, points.map(|point| if point < of_surface { point } else { -1 }).collect())?;
+        let points = 0..tets.point_count();
+        tets.set(SURFACE_POINT, points.map(|point| if point < on_surface { point as i32 } else { -1 }).collect())?;
     }
     if cx.wants(SIDE) {
         let number = |side: &ShellSide| match side {
@@ -145,6 +198,21 @@ fn tets(cx: &Cx, closed: &ClosedSurface, solid: TetMesh) -> Result<Component> {
         tets.set(SLIVER, solid.slivers.iter().map(|sliver| i32::from(*sliver)).collect())?;
     }
     Ok(tets)
+}
+
+/// Gives the points of the tets the attributes of the nearest points of the mesh.
+fn carry_attributes(cx: &Cx, tets: &mut Component, mesh: &Component) -> Result<()> {
+    let mut nearest: Option<Vec<u32>> = None;
+    for (_, name, column) in mesh.columns().filter(|(owner, name, _)| *owner == Owner::Point && ***name != *P.name) {
+        if !cx.wants_named(name) || tets.point_count() == 0 {
+            continue;
+        }
+        let rows = nearest
+            .get_or_insert_with(|| nearest_points(mesh.positions(), &mesh.triangles().corners, tets.positions()));
+        let carried = column.gather(rows);
+        tets.set_column(Owner::Point, name.clone(), carried)?;
+    }
+    Ok(())
 }
 
 /// The repaired mesh with all its attributes; the input itself if no repair was needed.
@@ -165,17 +233,23 @@ fn repaired(mesh: &Component, closed: &ClosedSurface) -> Result<Component> {
     Ok(repaired)
 }
 
-fn publish(cx: &Cx, mesh: &Component, closed: &ClosedSurface, solid: &TetMesh) {
+fn publish_tets(cx: &Cx, solid: &TetMesh, bodies: usize) {
     let measured = &solid.measured;
     cx.publish(COUNT, solid.tets.len() as f64);
-    cx.publish(BODIES, closed.bodies as f64);
+    cx.publish(BODIES, bodies as f64);
     cx.publish(MIN_DIHEDRAL, measured.min_dihedral);
     cx.publish(QUALITY_MEDIAN, measured.quality_median);
     cx.publish(VOLUME_ERROR, measured.volume_error);
+    cx.publish(SLIVERS, measured.slivers as f64);
+    cx.publish(SLIVER_SHARE, measured.slivers as f64 / solid.tets.len().max(1) as f64);
+}
+
+fn publish(cx: &Cx, mesh: &Component, closed: &ClosedSurface, solid: &TetMesh) {
+    let measured = &solid.measured;
+    publish_tets(cx, solid, closed.bodies);
     cx.publish(MISSING_FACES, measured.missing_faces as f64);
     cx.publish(MISSING_EDGES, measured.missing_edges as f64);
     cx.publish(BARE_POINTS, measured.bare_points as f64);
-    cx.publish(SLIVERS, measured.slivers as f64);
     cx.publish(REPAIRS, closed.changes.count() as f64);
     cx.publish(LOST_PIECES, lost_pieces(mesh, closed) as f64);
 }
@@ -211,7 +285,7 @@ fn refusal(fault: SurfaceFault) -> Error {
 }
 
 fn leaves_out(params: &Params, _: &Wires) -> Vec<LeftOut> {
-    match params.get(INTERIOR) {
+    match params.get(INTERIOR) || params.get(METHOD) == Method::Cage {
         true => Vec::new(),
         false => vec![LeftOut::new("interior points", "`interior` is false")],
     }

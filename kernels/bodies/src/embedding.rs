@@ -74,6 +74,20 @@ pub fn embed(points: &[Vec3], tets: &[[u32; 4]], carried: &[Vec3]) -> Option<Vec
     Some(bound)
 }
 
+/// For each position, the nearest corner of the triangle that is nearest to it; the first of `points` without triangles.
+///
+/// # Panics
+/// If a triangle has a corner index out of range.
+pub fn nearest_points(points: &[Vec3], triangles: &[[u32; 3]], positions: &[Vec3]) -> Vec<u32> {
+    let tree = TriangleTree::build(points, triangles);
+    parallel::tabulate(positions.len(), TASK, |n| {
+        let Some(found) = tree.closest(positions[n], f32::INFINITY) else { return 0 };
+        let distance = |corner: &u32| (to_f64(points[*corner as usize]) - to_f64(positions[n])).norm_squared();
+        let corners = triangles[found.triangle as usize];
+        corners.into_iter().reduce(|a, b| if distance(&b) < distance(&a) { b } else { a }).unwrap_or(0)
+    })
+}
+
 /// Maps positions to barycentric coordinates of one tet.
 struct BarycentricMap {
     first: DVec3,

@@ -8,6 +8,8 @@ pub(crate) const SURFACE_POINT: Attr<i32> = Attr::point("surface_point");
 pub(crate) const BODY_NUMBER: Attr<i32> = Attr::element("body");
 /// On tets of a body: 1 if the tet is too flat to have a meaningful volume, else 0.
 pub(crate) const SLIVER: Attr<i32> = Attr::element("sliver");
+/// On tets of a cage: the share of the tet that is inside the surface, by which its mass and stiffness are scaled.
+pub(crate) const FILL: Attr<f32> = Attr::element("fill");
 
 /// Of a goal: the frame at which the body reaches it.
 pub(crate) const GOAL_FRAME: Attr<f32> = Attr::once("goal_frame");

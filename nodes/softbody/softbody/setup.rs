@@ -11,7 +11,7 @@ use numerics::masked::Masked;
 use super::joints::{Couple, couple};
 use super::pins::{BoundPins, bind_pins};
 use super::{BODIES, COUPLING_RADIUS, COUPLING_STIFFNESS, DAMPING, DENSITY, PINS, STIFFNESS};
-use crate::shared::attributes::{BODY_NUMBER, SLIVER, SURFACE_POINT};
+use crate::shared::attributes::{BODY_NUMBER, FILL, SLIVER, SURFACE_POINT};
 use crate::shared::pieces::pieces;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -35,6 +35,8 @@ pub(super) struct SimulationSetup {
     pub(super) rest: Vec<[f64; 3]>,
     pub(super) tets: Vec<[u32; 4]>,
     slivers: Vec<bool>,
+    /// The filled share of each tet.
+    fill: Vec<f32>,
     missing: Vec<[u32; 2]>,
     joints: Vec<BodySpring>,
     /// The particles of each wire.
@@ -112,6 +114,7 @@ impl SimulationSetup {
     pub(super) fn of(cx: &Cx, inputs: &StartInputs) -> Result<Self> {
         let (mut surface, mut body): (Option<Component>, Option<Component>) = (None, None);
         let (mut rest, mut all, mut slivers, mut missing) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut fill = Vec::new();
         let (mut wires, mut triangles, mut carriers) = (Vec::new(), Vec::new(), Vec::new());
         let mut outer = Vec::new();
         for (wire, geometry) in inputs.bodies.iter().enumerate() {
@@ -123,6 +126,10 @@ impl SimulationSetup {
             match own.get(SLIVER) {
                 Some(flat) => slivers.extend(flat.iter().map(|flat| *flat != 0)),
                 None => slivers.resize(all.len(), false),
+            }
+            match own.get(FILL) {
+                Some(shares) => fill.extend_from_slice(shares),
+                None => fill.resize(all.len(), 1.0),
             }
             missing.extend(found.missing.iter().map(|edge| edge.map(|end| end + first)));
             triangles.extend(found.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
@@ -161,6 +168,7 @@ impl SimulationSetup {
             rest,
             tets: all,
             slivers,
+            fill,
             missing,
             joints,
             wires,
@@ -172,7 +180,13 @@ impl SimulationSetup {
 
     /// The body that the solver works on.
     pub(super) fn body(&self, material: &MaterialFields) -> Result<SoftBody> {
-        let mesh = Mesh { points: &self.rest, tets: &self.tets, slivers: &self.slivers, missing: &self.missing };
+        let mesh = Mesh {
+            points: &self.rest,
+            tets: &self.tets,
+            slivers: &self.slivers,
+            fill: &self.fill,
+            missing: &self.missing,
+        };
         SoftBody::new(&mesh, &material.material(), &self.joints).map_err(refusal)
     }
 

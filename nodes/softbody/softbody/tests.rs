@@ -64,6 +64,9 @@ fn with_inside(wire: usize, given: Geometry) -> Geometry {
         let marked = (0..block.point_count()).map(|point| if wire == 1 && point == row { 0 } else { -1 });
         block.set(SURFACE_POINT, marked.collect::<Vec<i32>>()).unwrap();
     }
+    if tets.get(FILL).is_some() {
+        block.set(FILL, (0..block.element_count()).map(|tet| 0.1 + 0.1 * (tet % 10) as f32).collect()).unwrap();
+    }
     block.into()
 }
 
@@ -474,4 +477,20 @@ fn bodies_of_all_wires_have_numbers_of_their_own() {
     let tets = cooked[&(1, Frame::whole(1))].tets().unwrap();
     let numbers: Vec<i32> = tets.get(BODY_NUMBER).unwrap().chunks(6).map(|body| body[0]).collect();
     assert_eq!(numbers, [0, 1, 2, 2, 4, 3]);
+}
+
+#[test]
+fn the_filled_share_of_tets_scales_mass_and_stiffness() {
+    let filled = |fill: f32| {
+        let mut cube = cube();
+        cube.set(FILL, vec![fill; cube.element_count()]).unwrap();
+        cube
+    };
+    let falling = |body: Component| simulating(body).set(DENSITY, 1000.0.into()).frames(1..=2);
+    let [whole, half, none] =
+        [falling(filled(1.0)), falling(filled(0.5)), falling(cube())].map(|frames| frames[1].metrics["kinetic"]);
+    // ½ m (g h)² of a cube of 0.1 m.
+    let expected = 0.5 * (G * H) * (G * H);
+    assert!((whole / expected - 1.0).abs() < 1e-6 && (half / whole - 0.5).abs() < 1e-9, "{whole} {half}");
+    assert_eq!(whole, none, "tets without the attribute are full");
 }

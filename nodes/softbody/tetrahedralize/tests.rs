@@ -42,7 +42,11 @@ fn inside_out(_: usize, given: Geometry) -> Geometry {
 
 #[test]
 fn it_conforms() {
-    conformance(&NODE).with(|bench| bench).with(|bench| bench.changed(SURFACE, inside_out)).run();
+    conformance(&NODE)
+        .with(|bench| bench)
+        .with(|bench| bench.changed(SURFACE, inside_out))
+        .with(|bench| bench.set(METHOD, Method::Cage))
+        .run();
 }
 
 #[test]
@@ -135,8 +139,8 @@ fn defects_that_cannot_or_must_not_be_repaired_are_refused_with_their_location()
     let sheet = mesh(&shapes::grid([1.0; 2], 1));
     assert_eq!(
         fact(filling(sheet)),
-        "the surface is open: the edge of face 0 between points 0 and 1 has no other face (4 such edges in all); only \
-         closed surfaces can be filled: close the hole, or give a thin wall a thickness"
+        "the surface is open: the edge of face 0 between points 0 and 1 has no other face (4 such edges in all); close \
+         the hole, or give a thin wall a thickness; or set `method` to \"cage\", which takes open surfaces"
     );
     let fine = fact(filling(ball(4, 1.0)).set(SPACING, 1e-4));
     assert!(fine.starts_with("a spacing of 0.0001 m would make about 7"), "{fine}");
@@ -179,4 +183,72 @@ fn pieces_lost_because_they_are_tiny_are_counted() {
     let far = moved(ball(4, 1.0)).concat(&tiny).unwrap();
     let out = filling(far).cook();
     assert_eq!((out.metrics["lost_pieces"], out.metrics["bodies"]), (1.0, 1.0));
+}
+
+/// A unit cube of n × n quads a side without its lower side.
+fn open_box(n: usize) -> Component {
+    let whole = mesh(&shapes::block([1.0; 3], [n; 3]));
+    let lower = |face: &&[u32]| !face.iter().all(|corner| whole.positions()[*corner as usize][1] < -0.49);
+    let faces: Vec<&[u32]> = whole.faces().unwrap().iter().filter(lower).collect();
+    let counts = faces.iter().map(|face| face.len() as u32).collect();
+    Component::mesh(counts, faces.concat(), whole.positions().to_vec()).unwrap()
+}
+
+#[test]
+fn an_open_box_is_caged_and_rides_along() {
+    let open = open_box(8);
+    let refused = filling(open.clone()).try_cook().unwrap_err().to_string();
+    assert!(refused.contains("set `method` to \"cage\""), "{refused}");
+    let out = filling(open.clone()).set(METHOD, Method::Cage).set(SPACING, 0.1).cook();
+    let address = |mesh: &Component| mesh.table(Owner::Point).column("P").unwrap().address();
+    assert_eq!(address(out.mesh()), address(&open), "the surface rides along as it is");
+    assert!(tets(&out).get(SURFACE_POINT).unwrap().iter().all(|point| *point == -1));
+    assert_eq!((out.metrics["bodies"], out.metrics["slivers"]), (1.0, 0.0));
+    let fill = tets(&out).get(FILL).unwrap();
+    assert!(fill.contains(&1.0) && fill.iter().all(|fill| (0.0625..=1.0).contains(fill)));
+    let sides = tets(&out).get(SIDE).unwrap();
+    assert!(sides.contains(&0) && sides.contains(&1) && !sides.contains(&2));
+    let middle = |tet: usize| tets(&out).tet_corners()[tet].map(|corner| tets(&out).positions()[corner as usize]);
+    let inside = |tet: &usize| middle(*tet).iter().flatten().all(|x| x.abs() < 0.4);
+    assert!((0..fill.len()).filter(inside).all(|tet| fill[tet] == 1.0), "what the box surrounds is full");
+}
+
+#[test]
+fn a_finer_mesh_rides_along_instead_of_the_surface() {
+    let (coarse, fine) = (ball(4, 0.2), ball(16, 0.2));
+    for method in [Method::Delaunay, Method::Cage] {
+        let out = filling(coarse.clone()).input(CARRY, fine.clone()).set(METHOD, method).cook();
+        assert_eq!(out.mesh().positions(), fine.positions());
+        assert!(tets(&out).get(SURFACE_POINT).unwrap().iter().all(|point| *point == -1));
+        let alone = filling(coarse.clone()).set(METHOD, method).cook();
+        assert_eq!(tets(&out).positions(), tets(&alone).positions(), "the tets are those of the surface");
+        assert_eq!(tets(&out).get(SIDE), tets(&alone).get(SIDE));
+    }
+}
+
+#[test]
+fn point_attributes_are_carried_to_the_tets_from_the_nearest_point() {
+    let mut ball = ball(8, 0.2);
+    let right: Vec<f32> = ball.positions().iter().map(|p| if p[0] > 0.0 { 1.0 } else { 0.25 }).collect();
+    ball.set(Attr::<f32>::point("soft"), right.clone()).unwrap();
+    ball.set(Attr::<[f32; 3]>::point("place"), ball.positions().to_vec()).unwrap();
+    ball.set(Attr::<i32>::element("paint"), vec![1; ball.element_count()]).unwrap();
+    for method in [Method::Delaunay, Method::Cage] {
+        let out = filling(ball.clone()).set(METHOD, method).cook();
+        let tets = tets(&out);
+        let soft = tets.get(Attr::<f32>::point("soft")).unwrap();
+        let place = tets.get(Attr::<[f32; 3]>::point("place")).unwrap();
+        if method == Method::Delaunay {
+            assert_eq!(soft[..right.len()], right);
+            assert_eq!(place[..right.len()], *ball.positions());
+        }
+        for ((p, soft), place) in tets.positions().iter().zip(soft).zip(place) {
+            let row = ball.positions().iter().position(|own| own == place).unwrap();
+            assert_eq!(*soft, right[row], "both are of the same point");
+            let distance = |own: &[f32; 3]| (to_f64(*own) - to_f64(*p)).norm();
+            let least = ball.positions().iter().map(distance).fold(f64::INFINITY, f64::min);
+            assert!(distance(place) <= 1.2 * least + 0.01, "{place:?} is near {p:?}");
+        }
+        assert!(tets.get(Attr::<i32>::element("paint")).is_none(), "faces have no tets");
+    }
 }

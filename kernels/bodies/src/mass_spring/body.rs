@@ -43,6 +43,9 @@ pub struct Mesh<'a> {
     pub tets: &'a [[u32; 4]],
     /// Which tetrahedra are too flat for volume preservation; their edges and masses still count. May be empty: none.
     pub slivers: &'a [bool],
+    /// The share of each tetrahedron that is filled with material, which scales its mass and stiffness. May be empty: all
+    /// of it.
+    pub fill: &'a [f32],
     /// Surface edges that no tetrahedron has. They become springs with the mean E·ΣV of the surface edges at their
     /// ends.
     pub missing: &'a [[u32; 2]],
@@ -122,7 +125,7 @@ pub struct SoftBody {
     /// Tetrahedra with a volume, oriented so that it is positive.
     pub(super) tets: Vec<[u32; 4]>,
     pub(super) volumes: Vec<f64>,
-    /// Young's modulus of each of `tets`.
+    /// Young's modulus of each of `tets`, times the share that is filled.
     pub(super) moduli: Vec<f64>,
     pub(super) regions: Regions,
     /// Springs in fixed parts, for parallel loops.
@@ -148,6 +151,8 @@ struct MeshTet {
     corners: [u32; 4],
     springs: [u32; 6],
     volume: f64,
+    /// The share of the volume that is filled with material.
+    fill: f64,
 }
 
 impl SoftBody {
@@ -265,8 +270,9 @@ impl SoftBody {
         let mesh_spring_count = self.mesh_spring_count;
         let mut stored = vec![0.0; mesh_spring_count];
         for tet in &self.given {
-            let quarter = 0.25 * tet.volume * mean_over(&material.density, tet.corners);
-            let energy = tet.volume * mean_over(&material.stiffness, tet.corners);
+            let filled = tet.volume * tet.fill;
+            let quarter = 0.25 * filled * mean_over(&material.density, tet.corners);
+            let energy = filled * mean_over(&material.stiffness, tet.corners);
             tet.corners.iter().for_each(|corner| masses[*corner as usize] += quarter);
             tet.springs.iter().for_each(|spring| stored[*spring as usize] += energy);
         }
@@ -282,8 +288,8 @@ impl SoftBody {
             self.stiffness[spring] = stiffness(spring, k)?;
             self.damping[spring] = number("damping", spring, mean_over(&material.damping, ends) * k)?;
         }
-        self.moduli =
-            self.kept.iter().map(|tet| mean_over(&material.stiffness, self.given[*tet as usize].corners)).collect();
+        let modulus = |tet: &MeshTet| tet.fill * mean_over(&material.stiffness, tet.corners);
+        self.moduli = self.kept.iter().map(|tet| modulus(&self.given[*tet as usize])).collect();
         let corners = |tet: &u32| self.given[*tet as usize].corners;
         let damping: Vec<f64> = self.kept.iter().map(|tet| mean_over(&material.damping, corners(tet))).collect();
         self.regions.set_material(&self.volumes, &self.moduli, &damping);
@@ -334,10 +340,12 @@ impl SoftBody {
             .tets
             .iter()
             .zip(tet_springs)
-            .map(|(corners, springs)| MeshTet {
+            .enumerate()
+            .map(|(tet, (corners, springs))| MeshTet {
                 corners: *corners,
                 springs,
                 volume: volume(corners.map(|corner| points[corner as usize])).abs(),
+                fill: mesh.fill.get(tet).map_or(1.0, |fill| f64::from(fill.clamp(0.0, 1.0))),
             })
             .collect();
         let ends: Vec<[u32; 2]> = ends.iter().map(|ends| ends.map(|end| order.index_of[end as usize])).collect();

@@ -14,25 +14,31 @@
 //! [`missing_edges`] lists the edges. Details below 2⁻²⁴ of the bounding box are lost.
 
 mod boundary;
+mod cage;
 mod closed;
 mod cubes;
 mod delaunay;
 mod edges;
 mod enclosure;
 pub mod grid;
+mod improve;
 mod insertion_order;
 mod interior;
+mod lattice;
 mod predicates;
 mod quality;
 mod repair;
 mod self_crossing;
 mod shells;
 mod solid;
+mod solid_angle;
+mod soup;
 mod surface_fault;
 mod winding;
 
 pub use boundary::{BoundaryFace, boundary};
 pub(crate) use boundary::{FACES, faces_of, oriented_boundary, sorted};
+pub use cage::{Cage, CagedSurface};
 pub use closed::ClosedSurface;
 pub use cubes::cubes;
 pub use delaunay::{Delaunay, NONE, delaunay};

@@ -8,6 +8,7 @@ use super::closed::ClosedSurface;
 use super::delaunay;
 use super::edges::TetsAround;
 use super::grid::GridPoint;
+use super::improve::{Improver, Unchanged};
 use super::interior::{InteriorPoint, POINTS_A_CUBE, SIDE_BY_EDGE, interior};
 use super::quality::{Measure, measure};
 use super::surface_fault::SurfaceFault;
@@ -70,10 +71,10 @@ pub struct FillQuality {
 }
 
 /// Tets of lower quality are slivers.
-pub const SLIVER: f64 = 0.02;
+pub const SLIVER: f64 = 0.04;
 
 /// Tets, edges or faces that a thread takes at a time.
-const TASK: usize = 256;
+pub(super) const TASK: usize = 256;
 
 /// Largest number of interior points: about 25 million tets, which take 2 gigabytes to build.
 const MOST_POINTS: f64 = (1 << 22) as f64;
@@ -87,13 +88,29 @@ impl ClosedSurface {
     /// # Errors
     /// If the spacing would make too many points, or shells overlap.
     pub fn fill(&self, fill: &FillSettings) -> Result<TetMesh, SurfaceFault> {
+        self.filled(fill, |tets| tets.run())
+    }
+
+    /// The carved Delaunay tets, as `finish` leaves them.
+    pub(super) fn filled(
+        &self,
+        fill: &FillSettings,
+        finish: impl FnOnce(Improver<'_>) -> (Vec<[u32; 4]>, Vec<u32>),
+    ) -> Result<TetMesh, SurfaceFault> {
         let winding = Winding::new(&self.grid_points, &self.shells.triangles, &self.shells.shell_of);
         let inner = if fill.interior { interior(self, &winding, self.spacing(fill.spacing)?) } else { Vec::new() };
         let carved = Carving { closed: self, winding: &winding, inner: &inner };
         let bodies = parallel::map(carved.members(), |body, points| carved.body(body as u32, &points));
         let bodies: Vec<Vec<[u32; 4]>> = bodies.into_iter().collect::<Result<_, _>>()?;
         let of = bodies.iter().enumerate().flat_map(|(body, tets)| std::iter::repeat_n(body as u32, tets.len()));
-        Ok(self.solid(&inner, bodies.concat(), of.collect()))
+        let place = |inner: &InteriorPoint| self.grid.point(inner.grid_point.map(f64::from)).map(|x| x as f32);
+        let mut points = self.points.clone();
+        points.extend(inner.iter().map(place));
+        let edges = self.edges();
+        let surface = Unchanged { points: self.points.len(), edges: &edges, triangles: &self.shells.triangles };
+        let improver = Improver::new(surface, self.grid.step(), &mut points, bodies.concat(), of.collect());
+        let (tets, bodies) = finish(improver);
+        Ok(self.solid(points, tets, bodies))
     }
 
     /// About how many bytes [`fill`](Self::fill) takes.
@@ -136,14 +153,12 @@ impl ClosedSurface {
         (depth(&deepest) % 2 == 0).then(|| self.shells.all[deepest as usize].body)
     }
 
-    fn solid(&self, inner: &[InteriorPoint], tets: Vec<[u32; 4]>, bodies: Vec<u32>) -> TetMesh {
-        let mut points = self.points.clone();
+    fn solid(&self, points: Vec<[f32; 3]>, tets: Vec<[u32; 4]>, bodies: Vec<u32>) -> TetMesh {
         let outward = |shell: &u32| match self.shells.all[*shell as usize].depth % 2 {
             0 => ShellSide::Outer,
             _ => ShellSide::Inner,
         };
         let mut sides: Vec<ShellSide> = self.shell_of.iter().map(outward).collect();
-        points.extend(inner.iter().map(|inner| self.grid.point(inner.grid_point.map(f64::from)).map(|x| x as f32)));
         sides.resize(points.len(), ShellSide::Interior);
         // In grid steps, so that no squared length over- or underflows.
         let step = self.grid.step();
@@ -261,7 +276,7 @@ fn count<T: Sync>(things: &[T], is_so: impl Fn(&T) -> bool + Sync) -> usize {
     parallel::map(things.chunks(TASK), |_, things| things.iter().filter(|thing| is_so(thing)).count()).iter().sum()
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
     let middle = values.len() / 2;
     if values.is_empty() { 0.0 } else { *values.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }

@@ -145,14 +145,18 @@ impl SurfaceFault {
             | Self::UnusedPoint { .. } => "`repair` \"safe\" removes them",
             Self::InconsistentOrientation { .. } | Self::InsideOut { .. } => "`repair` \"safe\" flips them",
             Self::OpenEdge { .. } => {
-                "only closed surfaces can be filled: close the hole, or give a thin wall a thickness"
+                "close the hole, or give a thin wall a thickness; or set `method` to \"cage\", which takes open surfaces"
             }
             Self::NonManifoldEdge { .. } => {
-                "remove the faces inside the body, or separate the bodies that share the edge"
+                "remove the faces inside the body, or separate the bodies that share the edge; or set `method` to \
+                 \"cage\", which takes any surface"
             }
-            Self::NonOrientable { .. } | Self::NoVolume { .. } => "only a surface around a volume can be filled",
+            Self::NonOrientable { .. } | Self::NoVolume { .. } => {
+                "only a surface around a volume can be filled; set `method` to \"cage\", which also takes sheets"
+            }
             Self::SelfIntersection { .. } | Self::SelfOverlap { .. } => {
-                "separate them, or merge them into one surface first"
+                "separate them, or merge them into one surface first; or set `method` to \"cage\", which takes surfaces \
+                 that cross"
             }
             Self::TooManyPoints { .. } => "make `spacing` larger",
         }

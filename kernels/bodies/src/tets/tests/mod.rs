@@ -1,7 +1,9 @@
 //! Tests of tetrahedralisation, and the exact checks they share.
 
+mod cages;
 mod complex;
 mod predicates;
+mod slivers;
 mod solids;
 mod surfaces;
 
