@@ -49,6 +49,8 @@ choice! {
 
 /// Number of times within a step at which colliders are sampled.
 const COLLIDER_SAMPLES: u8 = 4;
+/// Number of frames in which what starts inside is pushed out.
+const SEPARATION_FRAMES: u32 = 12;
 
 inputs! { INPUTS:
     BODIES: Input<Many> = Input::many("bodies", Kind::Tets,
@@ -195,10 +197,13 @@ metrics! { METRICS:
             `stiffness`, or lower `density` or `gravity`.");
     CONTACTS = Metric::new("contacts", Unit::None, "Contacts in which surfaces press on each other.");
     DEEPEST_OVERLAP = Metric::new("deepest_overlap", Unit::Metres,
-        "By how much surfaces came closer than `thickness` at the worst contact. More than `thickness` means \
-         penetration.");
+        "`thickness` minus the smallest distance between surfaces, as returned, negative inside: by how much surfaces are \
+         closer than `thickness` at the worst place. More than `thickness` means that something is inside.");
+    POINTS_INSIDE = Metric::new("points_inside", Unit::None,
+        "Particles and points of the surface that are returned inside a closed collider or another body.");
     DEEPEST_PENETRATION = Metric::new("deepest_penetration", Unit::Metres,
-        "By how much `deepest_overlap` exceeds `thickness`: how far surfaces went through each other.")
+        "By how much `deepest_overlap` exceeds `thickness`: how far surfaces went through each other. 0 while what \
+         starts inside is pushed out.")
         .warn_above(0.0, "Surfaces went through each other. Set more `substeps`, slow the colliders, leave more room \
             between them, or raise `thickness`.");
     JAMMED = Metric::new("jammed", Unit::None,
@@ -208,8 +213,8 @@ metrics! { METRICS:
     STARTED_INSIDE = Metric::new("started_inside", Unit::None,
         "Particles that are deeper than `thickness` inside a closed collider, inside another body, or below the ground \
          when the simulation starts.")
-        .warn_above(0.0, "Bodies start inside a collider, inside each other or below the ground, and are pushed out \
-            abruptly, or on the wrong side. Move them apart at `start_frame`.");
+        .warn_above(0.0, "Bodies start inside a collider, inside each other or below the ground, and are pushed out the \
+            shortest way over 12 frames, which may be the wrong one. Move them apart at `start_frame`.");
     LET_GO = Metric::new("let_go", Unit::None,
         "Edges of the surface that are stretched to more than 8 times their rest length, so that colliders let them \
          pass.")
@@ -251,7 +256,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
-    3,
+    4,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
      other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
      pins hold them. `stiffness` has the same effect at any mesh resolution, and the solver is stable for any \

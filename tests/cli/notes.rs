@@ -335,13 +335,13 @@ fn what_goes_wrong_with_a_soft_body_is_noted() {
     let doubled = [r#""frame": 6"#, r#""frame": 4"#];
     only(
         &[doubled],
-        "`soft` (Softbody): `doubled_goals` is 1 at frame 2",
+        "`soft` (Softbody): `doubled_goals` is 1 at frame 1",
         "At the `frame` of `later` at `goals` its body",
     );
     let early = [r#""frame": 6"#, r#""frame": -6"#];
-    only(&[early], "`soft` (Softbody): `early_goals` is 1 at frame 2", "`later` at `goals` is over when the");
+    only(&[early], "`soft` (Softbody): `early_goals` is 1 at frame 1", "`later` at `goals` is over when the");
     let hollow = [r#"{"surface": "ball"}"#, r#"{"surface": "ball"}, "params": {"interior": false}"#];
-    only(&[hollow], "`soft` (Softbody): `idle_goals` is 2 at frame 2", "`goal` at `goals` has no effect");
+    only(&[hollow], "`soft` (Softbody): `idle_goals` is 2 at frame 1", "`goal` at `goals` has no effect");
     let weak = [r#""strength": 1e4"#, r#""strength": 1e-3"#];
     let away = [r#""scale": [0.9, 1.1, 1]"#, r#""scale": [0.9, 1.1, 1], "translate": [0, 0.2, 0]"#];
     only(&[weak, away], "`soft` (Softbody): `goal_miss` is ", "Raise `strength` of Softbody_Goal");

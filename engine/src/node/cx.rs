@@ -269,6 +269,13 @@ impl FrameCx<'_> {
             None => panic!("it asks for an integral and declares no integrand"),
         }
     }
+
+    /// The wires of an input at its declared times within a step, oldest first; the first is the previous frame, the
+    /// last this frame. If something upstream exists at whole frames alone, there are no others. Where a chain starts
+    /// there is this frame alone, and outside of chains none.
+    pub fn samples<A>(&self, input: super::Input<A>) -> &[(Frame, Vec<Arc<Geometry>>)] {
+        &self.data(input.name()).steps
+    }
 }
 
 /// The context of a window or solver that steps from one frame to the next.
@@ -293,11 +300,5 @@ impl StepCx<'_> {
     /// Length of the step, seconds.
     pub fn dt(&self) -> f64 {
         (self.frame.ticks() - self.previous.ticks()) as f64 / Frame::TICKS as f64 / self.clock.fps
-    }
-
-    /// The wires of an input at its declared times within the step, oldest first; the first is the previous frame, the
-    /// last this frame. If something upstream exists at whole frames alone, there are no others.
-    pub fn samples<A>(&self, input: super::Input<A>) -> &[(Frame, Vec<Arc<Geometry>>)] {
-        &self.data(input.name()).steps
     }
 }

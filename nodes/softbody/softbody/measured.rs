@@ -4,8 +4,8 @@ use bodies::mass_spring::{FrameReport, State};
 use engine::prelude::*;
 
 use super::{
-    CAPS_HIT, CG, CONTACTS, DEEPEST_OVERLAP, ELASTIC, ENERGY_SHED, ERROR_ESTIMATE, GOAL_ENERGY, INVERTED_TETS, JAMMED,
-    KINETIC, NEWTON, RESIDUAL, SUBSTEPS_USED, TOLERANCE_MISSED, TORN, VOLUME_RATIO, WORST_STRETCH,
+    CAPS_HIT, CG, CONTACTS, ELASTIC, ENERGY_SHED, ERROR_ESTIMATE, GOAL_ENERGY, INVERTED_TETS, JAMMED, KINETIC, NEWTON,
+    RESIDUAL, SUBSTEPS_USED, TOLERANCE_MISSED, TORN, VOLUME_RATIO, WORST_STRETCH,
 };
 
 /// The metrics of a frame that the solver alone determines.
@@ -25,7 +25,6 @@ pub(super) fn measured(report: &FrameReport, state: &State) -> MetricValues {
     metrics.set(WORST_STRETCH, report.worst_stretch);
     metrics.set(INVERTED_TETS, report.inverted_tets);
     metrics.set(CONTACTS, report.contacts);
-    metrics.set(DEEPEST_OVERLAP, report.deepest_overlap);
     metrics.set(JAMMED, report.jammed);
     metrics.set(TORN, state.torn.iter().filter(|torn| **torn).count() as f64);
     metrics.set(SUBSTEPS_USED, report.substeps);

@@ -2,8 +2,10 @@
 
 use std::sync::{Arc, OnceLock};
 
-use bodies::collision::{CollisionScene, ContactParams, Ground};
-use bodies::mass_spring::{BodySolver, Integrator, Plasticity, SoftBody, SolverFrame, State, flow, reset, tear};
+use bodies::collision::{CollisionScene, ContactParams, Ground, Obstacle, Overlap, Separation};
+use bodies::mass_spring::{
+    BodySolver, FrameReport, GoalSpring, Integrator, Pin, Plasticity, SoftBody, SolverFrame, State, flow, reset, tear,
+};
 use engine::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -11,11 +13,11 @@ use super::goals::{GoalHistory, Goals};
 use super::measured::measured;
 use super::setup::{MaterialFields, ParticleNumber, SimulationSetup, StartInputs, refusal};
 use super::{
-    BODY_COLLISION, COLLIDERS, COUPLING_BREAK, DEEPEST_PENETRATION, DRAG, FRICTION, GOAL_DISTANCE, GOAL_ON, GOALS,
-    GRAVITY, GROUND, GROUND_HEIGHT, IDLE_PINS, IDLE_PINS_POINT, IDLE_PINS_WIRE, INITIAL_VELOCITY, INTEGRATOR,
-    KEEP_DENTS, LET_GO, PINNED, PINS, PLASTIC_CREEP, PLASTIC_WORK, PLASTIC_YIELD, RESET_ENERGY, RESET_FRAMES,
-    RESET_TO_GOALS, SELF_COLLISION, START_FRAME, STARTED_INSIDE, STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping,
-    TETS, THICKNESS, TIME_SCALE, TOLERANCE, VOLUME,
+    BODY_COLLISION, COLLIDERS, COUPLING_BREAK, DEEPEST_OVERLAP, DEEPEST_PENETRATION, DRAG, FRICTION, GOAL_DISTANCE,
+    GOAL_ON, GOALS, GRAVITY, GROUND, GROUND_HEIGHT, IDLE_PINS, IDLE_PINS_POINT, IDLE_PINS_WIRE, INITIAL_VELOCITY,
+    INTEGRATOR, KEEP_DENTS, LET_GO, PINNED, PINS, PLASTIC_CREEP, PLASTIC_WORK, PLASTIC_YIELD, POINTS_INSIDE,
+    RESET_ENERGY, RESET_FRAMES, RESET_TO_GOALS, SELF_COLLISION, SEPARATION_FRAMES, START_FRAME, STARTED_INSIDE,
+    STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS, TIME_SCALE, TOLERANCE, VOLUME,
 };
 use super::{obstacles, pins};
 
@@ -25,7 +27,10 @@ pub(super) struct Run {
     inputs: StartInputs,
     state: State,
     goals: GoalHistory,
-    /// Metrics of the last step; empty at the start.
+    /// What overlapped at the start, and the number of frames since in which time passed.
+    overlaps: Vec<Overlap>,
+    frames_over: u32,
+    /// Metrics of the last step, or of the start.
     metrics: MetricValues,
     /// Computed from `inputs` only, and recomputed after a checkpoint.
     #[serde(skip)]
@@ -42,6 +47,22 @@ struct Solving {
     values: [f32; 3],
 }
 
+/// A step between two frames, or the start, which takes no time.
+#[derive(Clone, Copy)]
+struct Interval {
+    frames: [f64; 2],
+    seconds: f64,
+}
+
+/// What acts on bodies in a step, besides contacts.
+struct Influences<'a> {
+    goals: Goals<'a>,
+    pulled: Vec<GoalSpring>,
+    held: Vec<Pin>,
+    /// Number of particles held or pulled by pins.
+    pinned: usize,
+}
+
 impl Chain for Run {
     fn start(cx: &FrameCx) -> Result<Self> {
         let inputs = StartInputs::at(cx);
@@ -49,101 +70,23 @@ impl Chain for Run {
         let solving = Solving::new(&setup, &MaterialFields::at(cx, &inputs)?)?;
         let mut state = State::at_rest(&solving.body);
         state.velocities.fill(cx.get(INITIAL_VELOCITY).map(f64::from));
-        let setup = OnceLock::from(Arc::new(setup));
-        let (goals, metrics) = (GoalHistory::default(), MetricValues::default());
-        Ok(Self { inputs, state, goals, metrics, setup, solving: Some(solving) })
+        let mut run = Self {
+            inputs,
+            state,
+            goals: GoalHistory::default(),
+            overlaps: Vec::new(),
+            frames_over: 0,
+            metrics: MetricValues::default(),
+            setup: OnceLock::from(Arc::new(setup)),
+            solving: Some(solving),
+        };
+        run.advance(cx, Interval { frames: [cx.frame().number(); 2], seconds: 0.0 })?;
+        Ok(run)
     }
 
     fn step(&mut self, cx: &StepCx) -> Result<()> {
-        let setup = self.setup(cx)?;
-        let material = MaterialFields::at(cx, &self.inputs)?;
-        let mut solving = match self.solving.take() {
-            Some(solving) => solving.of(&material)?,
-            None => Solving::new(&setup, &material)?,
-        };
-        let times = [cx.previous(), cx.frame()].map(Frame::number);
-        let seconds = cx.dt() * f64::from(cx.get(TIME_SCALE));
-        let on = cx.get(GOAL_ON);
-        let (whole, frames) = (f64::from(cx.get(RESET_TO_GOALS)), cx.get(RESET_FRAMES) as f64);
-        let mut goals = Goals::of(&self.inputs, &setup, &cx.part(GOALS), cx.get(START_FRAME) as f64, &mut self.goals)?;
-        goals.start(times, &self.state.positions);
-        let (mut pulled, mut held) = (Vec::new(), Vec::new());
-        goals.pull(times, on, &mut pulled);
-        let by_goals = pulled.len();
-        if let [(_, before), .., (_, now)] = cx.samples(PINS) {
-            pins::pull(&setup.pins.bindings, [before, now], cx.frame(), &mut held, &mut pulled)?;
-        }
-        let pinned = held.len() + pulled.len() - by_goals;
-        let contact_friction = ParticleNumber::of(cx, &self.inputs, FRICTION)?;
-        let (friction, thickness) = (f64::from(contact_friction.value), f64::from(cx.get(THICKNESS)));
-        let obstacles = obstacles::obstacles(cx.samples(COLLIDERS), seconds, thickness, friction)?;
-        let rub = ContactParams { thickness, friction };
-        let ground = Ground { up: [0.0, 1.0, 0.0], height: f64::from(cx.get(GROUND_HEIGHT)), thickness, friction };
-        let scene = CollisionScene {
-            skins: &setup.skins,
-            friction: contact_friction.mask.as_deref(),
-            ground: cx.get(GROUND).then_some(ground),
-            obstacles: &obstacles,
-            body_contact: (cx.get(BODY_COLLISION) && setup.skins.len() > 1).then_some(rub),
-            self_contact: cx.get(SELF_COLLISION).then_some(rub),
-        };
-        let touches = scene.ground.is_some()
-            || !obstacles.is_empty()
-            || scene.body_contact.is_some()
-            || scene.self_contact.is_some();
-        let frame = SolverFrame {
-            seconds,
-            gravity: cx.get(GRAVITY).map(f64::from),
-            drag: f64::from(cx.get(DRAG)),
-            volume: f64::from(cx.get(VOLUME)),
-            goals: &pulled,
-            pins: &held,
-            contacts: if touches { Some(&scene) } else { None },
-            integrator: match cx.get(INTEGRATOR) {
-                Stepping::Default => Integrator::Default,
-                Stepping::Accurate => Integrator::Accurate { tolerance: cx.get(TOLERANCE) },
-                Stepping::Euler => Integrator::Euler,
-            },
-            substeps: cx.get(SUBSTEPS) as u32,
-            force_implicit_euler: goals.reset_at(times[0], whole, frames),
-            cancelled: &|| cx.check_cancelled().is_err(),
-        };
-        // Positions are those of the start only in the first step.
-        let started_inside =
-            self.metrics.get(STARTED_INSIDE).unwrap_or_else(|| scene.count_inside(&self.state.positions) as f64);
-        let report = solving.solver.step(&solving.body, &mut self.state, &frame);
-        cx.check_cancelled()?;
-        let plasticity =
-            Plasticity { yield_strain: f64::from(cx.get(PLASTIC_YIELD)), creep: f64::from(cx.get(PLASTIC_CREEP)) };
-        let drawn = goals.shape(times[1]);
-        let plastic_work = flow(&solving.body, &mut self.state, plasticity, seconds, drawn.as_deref());
-        let mut brought = 0.0;
-        let keep = f64::from(cx.get(KEEP_DENTS));
-        goals.resets(times[1], whole, frames, |shape, share| {
-            brought += reset(&solving.body, &mut self.state, shape, share, keep);
-        });
-        let stretch = f64::from(cx.get(COUPLING_BREAK));
-        if setup.joints() > 0 && stretch > 0.0 {
-            let _ = tear(&solving.body, &mut self.state, stretch, NEAR * solving.body.size());
-        }
-        let far = goals.distance(times[1], on, &self.state.positions);
-        let let_go = if obstacles.is_empty() { 0 } else { setup.let_go(&self.state.positions) };
-        self.metrics = measured(&report, &self.state);
-        self.metrics.set(RESET_ENERGY, brought);
-        self.metrics.set(PLASTIC_WORK, plastic_work);
-        self.metrics.set(LET_GO, let_go as f64);
-        self.metrics.set(STARTED_INSIDE, started_inside);
-        let thickness = f64::from(cx.get(THICKNESS));
-        let support = solving.body.stiffness_to_weight(frame.gravity);
-        if support.is_finite() && (scene.ground.is_some() || !obstacles.is_empty()) {
-            self.metrics.set(STIFFNESS_TO_WEIGHT, support);
-        }
-        self.metrics.set(DEEPEST_PENETRATION, (report.deepest_overlap - thickness).max(0.0));
-        self.metrics.set(GOAL_DISTANCE, far.unwrap_or(0.0));
-        goals.measure(times[1], on, &self.state.positions, &mut self.metrics);
-        self.metrics.set(PINNED, pinned as f64);
-        self.solving = Some(solving);
-        Ok(())
+        let frames = [cx.previous(), cx.frame()].map(Frame::number);
+        self.advance(cx, Interval { frames, seconds: cx.dt() * f64::from(cx.get(TIME_SCALE)) })
     }
 
     fn output(&self, cx: &FrameCx) -> Result<Outputs> {
@@ -166,12 +109,179 @@ impl Chain for Run {
 const NEAR: f64 = 1e-6;
 
 impl Run {
+    /// Moves bodies through an interval and sets the metrics; at the start only these.
+    fn advance(&mut self, cx: &FrameCx, interval: Interval) -> Result<()> {
+        let setup = self.setup(cx)?;
+        let material = MaterialFields::at(cx, &self.inputs)?;
+        let mut solving = match self.solving.take() {
+            Some(solving) => solving.of(&material)?,
+            None => Solving::new(&setup, &material)?,
+        };
+        let is_start = interval.frames[0] == interval.frames[1];
+        let friction = ParticleNumber::of(cx, &self.inputs, FRICTION)?;
+        let rub = ContactParams { thickness: f64::from(cx.get(THICKNESS)), friction: f64::from(friction.value) };
+        let obstacles = obstacles::obstacles(cx.samples(COLLIDERS), interval.seconds, rub.thickness, rub.friction)?;
+        let mut scene = scene(cx, &setup, &obstacles, rub);
+        scene.friction = friction.mask.as_deref();
+        if is_start {
+            let (overlaps, inside) = scene.overlaps(&self.state.positions);
+            self.overlaps = overlaps;
+            self.metrics.set(STARTED_INSIDE, inside as f64);
+        }
+        let overlaps = std::mem::take(&mut self.overlaps);
+        let (over, seconds) = (self.frames_over, interval.seconds);
+        scene.separation = Some(Separation { overlaps: &overlaps, frames: SEPARATION_FRAMES, over, seconds });
+        let mut goals = std::mem::take(&mut self.goals);
+        let mut influences = self.influences(cx, &setup, &mut goals, interval)?;
+        let report = self.solve(cx, &mut solving, &influences, &scene, interval)?;
+        let started_inside = self.metrics.get(STARTED_INSIDE).unwrap_or(0.0);
+        self.metrics = measured(&report, &self.state);
+        self.metrics.set(STARTED_INSIDE, started_inside);
+        self.metrics.set(PLASTIC_WORK, 0.0);
+        self.metrics.set(RESET_ENERGY, 0.0);
+        if !is_start {
+            self.deform(cx, &setup, &solving.body, &influences.goals, interval);
+        }
+        let far = influences.goals.distance(interval.frames[1], cx.get(GOAL_ON), &self.state.positions);
+        self.metrics.set(GOAL_DISTANCE, far.unwrap_or(0.0));
+        self.frames_over = over.saturating_add(u32::from(seconds > 0.0));
+        let apart = overlaps.is_empty() || self.frames_over >= SEPARATION_FRAMES;
+        self.measure_contacts(&setup, &scene, rub.thickness, apart);
+        let support = solving.body.stiffness_to_weight(cx.get(GRAVITY).map(f64::from));
+        if support.is_finite() && (scene.ground.is_some() || !obstacles.is_empty()) {
+            self.metrics.set(STIFFNESS_TO_WEIGHT, support);
+        }
+        self.metrics.set(PINNED, influences.pinned as f64);
+        influences.goals.measure(interval.frames[1], cx.get(GOAL_ON), &self.state.positions, &mut self.metrics);
+        (self.goals, self.overlaps, self.solving) = (goals, overlaps, Some(solving));
+        Ok(())
+    }
+
+    /// The goals and pins of an interval.
+    fn influences<'a>(
+        &self,
+        cx: &'a FrameCx<'_>,
+        setup: &'a SimulationSetup,
+        history: &'a mut GoalHistory,
+        interval: Interval,
+    ) -> Result<Influences<'a>> {
+        let wired = cx.part(GOALS);
+        let mut goals = Goals::of(&self.inputs, setup, &wired, cx.get(START_FRAME) as f64, history)?;
+        let (mut pulled, mut held) = (Vec::new(), Vec::new());
+        if interval.frames[0] < interval.frames[1] {
+            goals.start(interval.frames, &self.state.positions);
+        }
+        goals.pull(interval.frames, cx.get(GOAL_ON), &mut pulled);
+        let by_goals = pulled.len();
+        let samples = cx.samples(PINS);
+        if let Some(((_, before), (_, now))) = samples.first().zip(samples.last()) {
+            pins::pull(&setup.pins.bindings, [before, now], cx.frame(), &mut held, &mut pulled)?;
+        }
+        let pinned = held.len() + pulled.len() - by_goals;
+        Ok(Influences { goals, pulled, held, pinned })
+    }
+
+    /// Steps the solver.
+    fn solve(
+        &mut self,
+        cx: &FrameCx,
+        solving: &mut Solving,
+        influences: &Influences<'_>,
+        scene: &CollisionScene<'_>,
+        interval: Interval,
+    ) -> Result<FrameReport> {
+        let touches = scene.ground.is_some()
+            || !scene.obstacles.is_empty()
+            || scene.body_contact.is_some()
+            || scene.self_contact.is_some();
+        let (whole, frames) = (f64::from(cx.get(RESET_TO_GOALS)), cx.get(RESET_FRAMES) as f64);
+        let frame = SolverFrame {
+            seconds: interval.seconds,
+            gravity: cx.get(GRAVITY).map(f64::from),
+            drag: f64::from(cx.get(DRAG)),
+            volume: f64::from(cx.get(VOLUME)),
+            goals: &influences.pulled,
+            pins: &influences.held,
+            contacts: if touches { Some(scene) } else { None },
+            integrator: match cx.get(INTEGRATOR) {
+                Stepping::Default => Integrator::Default,
+                Stepping::Accurate => Integrator::Accurate { tolerance: cx.get(TOLERANCE) },
+                Stepping::Euler => Integrator::Euler,
+            },
+            substeps: cx.get(SUBSTEPS) as u32,
+            force_implicit_euler: influences.goals.reset_at(interval.frames[0], whole, frames),
+            cancelled: &|| cx.check_cancelled().is_err(),
+        };
+        let report = solving.solver.step(&solving.body, &mut self.state, &frame);
+        cx.check_cancelled()?;
+        Ok(report)
+    }
+
+    /// Changes rest shapes at the end of a step: by plastic flow, towards goals that are passed, and by tearing.
+    fn deform(
+        &mut self,
+        cx: &FrameCx,
+        setup: &SimulationSetup,
+        body: &SoftBody,
+        goals: &Goals<'_>,
+        interval: Interval,
+    ) {
+        let now = interval.frames[1];
+        let plasticity =
+            Plasticity { yield_strain: f64::from(cx.get(PLASTIC_YIELD)), creep: f64::from(cx.get(PLASTIC_CREEP)) };
+        let drawn = goals.shape(now);
+        self.metrics.set(PLASTIC_WORK, flow(body, &mut self.state, plasticity, interval.seconds, drawn.as_deref()));
+        let (whole, frames) = (f64::from(cx.get(RESET_TO_GOALS)), cx.get(RESET_FRAMES) as f64);
+        let (mut brought, keep) = (0.0, f64::from(cx.get(KEEP_DENTS)));
+        goals.resets(now, whole, frames, |shape, share| {
+            brought += reset(body, &mut self.state, shape, share, keep);
+        });
+        self.metrics.set(RESET_ENERGY, brought);
+        let stretch = f64::from(cx.get(COUPLING_BREAK));
+        if setup.joints() > 0 && stretch > 0.0 {
+            let _ = tear(body, &mut self.state, stretch, NEAR * body.size());
+        }
+    }
+
+    /// Sets the metrics of contacts from the positions that are returned. Until what overlapped at the start is `apart`,
+    /// surfaces went through nothing.
+    fn measure_contacts(&mut self, setup: &SimulationSetup, scene: &CollisionScene<'_>, thickness: f64, apart: bool) {
+        let returned: Vec<[f64; 3]> =
+            self.state.positions.iter().map(|position| position.map(|x| f64::from(x as f32))).collect();
+        let found = scene.penetration(&returned, &setup.carried_at(&self.state.positions));
+        let through = if apart { (found.deepest - thickness).max(0.0) } else { 0.0 };
+        self.metrics.set(DEEPEST_OVERLAP, found.deepest);
+        self.metrics.set(POINTS_INSIDE, found.inside as f64);
+        self.metrics.set(DEEPEST_PENETRATION, through);
+        let let_go = if scene.obstacles.is_empty() { 0 } else { setup.let_go(&self.state.positions) };
+        self.metrics.set(LET_GO, let_go as f64);
+    }
+
     fn setup(&self, cx: &Cx) -> Result<Arc<SimulationSetup>> {
         if let Some(setup) = self.setup.get() {
             return Ok(setup.clone());
         }
         let setup = Arc::new(SimulationSetup::of(cx, &self.inputs)?);
         Ok(self.setup.get_or_init(|| setup).clone())
+    }
+}
+
+/// What may be in contact.
+fn scene<'a>(
+    cx: &FrameCx,
+    setup: &'a SimulationSetup,
+    obstacles: &'a [Obstacle],
+    rub: ContactParams,
+) -> CollisionScene<'a> {
+    let ContactParams { thickness, friction } = rub;
+    let ground = Ground { up: [0.0, 1.0, 0.0], height: f64::from(cx.get(GROUND_HEIGHT)), thickness, friction };
+    CollisionScene {
+        skins: &setup.skins,
+        ground: cx.get(GROUND).then_some(ground),
+        obstacles,
+        body_contact: (cx.get(BODY_COLLISION) && setup.skins.len() > 1).then_some(rub),
+        self_contact: cx.get(SELF_COLLISION).then_some(rub),
+        ..CollisionScene::default()
     }
 }
 

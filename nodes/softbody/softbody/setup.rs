@@ -51,6 +51,8 @@ pub(super) struct SimulationSetup {
     pub(super) body: Component,
     /// The embedding of each point of the surface in the tets.
     pub(super) carriers: Vec<EmbeddedPoint>,
+    /// By skin, the points of the surface that are no particles, as indices of `carriers`.
+    pub(super) carried: Vec<Vec<usize>>,
 }
 
 /// One wire's surface: triangles of its particles, and its output mesh with the embedding of its points.
@@ -165,6 +167,7 @@ impl SimulationSetup {
             surface: surface.map_or_else(|| Component::mesh(Vec::new(), Vec::new(), Vec::new()), Ok)?,
             body: body.map_or_else(|| Component::tets(Vec::new(), Vec::new()), Ok)?,
             carriers,
+            carried: Vec::new(),
             rest,
             tets: all,
             slivers,
@@ -175,7 +178,14 @@ impl SimulationSetup {
         };
         let links = setup.body(&material)?.springs();
         setup.skins = skins(&setup.rest, &triangles, &parts, &links)?;
+        setup.carried = carried(&setup.skins, &setup.carriers, setup.rest.len());
         Ok(setup)
+    }
+
+    /// The positions of these points, as they are returned.
+    pub(super) fn carried_at(&self, positions: &[[f64; 3]]) -> Vec<Vec<[f64; 3]>> {
+        let at = |point: &usize| self.carriers[*point].position(positions).map(|x| f64::from(x as f32));
+        self.carried.iter().map(|points| points.iter().map(at).collect()).collect()
     }
 
     /// The body that the solver works on.
@@ -294,6 +304,21 @@ fn rows(tets: &Component, mesh: &Component) -> Option<Vec<u32>> {
         *rows.get_mut(*row as usize)? = point as u32;
     }
     (!rows.is_empty() && !rows.contains(&u32::MAX)).then_some(rows)
+}
+
+/// By skin, the surface points that are no particles.
+fn carried(skins: &[BodySkin], carriers: &[EmbeddedPoint], particles: usize) -> Vec<Vec<usize>> {
+    let mut skin_of = vec![None; particles];
+    for (index, skin) in skins.iter().enumerate() {
+        skin.particles().iter().for_each(|particle| skin_of[*particle as usize] = Some(index));
+    }
+    let mut carried = vec![Vec::new(); skins.len()];
+    for (point, carrier) in carriers.iter().enumerate().filter(|(_, carrier)| carrier.weights[0] != 1.0) {
+        if let Some(skin) = skin_of[carrier.particles[0] as usize] {
+            carried[skin].push(point);
+        }
+    }
+    carried
 }
 
 fn skins(rest: &[[f64; 3]], triangles: &[[u32; 3]], parts: &[u32], links: &[[u32; 2]]) -> Result<Vec<BodySkin>> {

@@ -284,6 +284,71 @@ fn particles_that_start_inside_something_are_counted_at_every_frame() {
     assert_eq!((inside(two(0.2)), inside(two(0.06).set(BODY_COLLISION, false))), (0.0, 0.0));
 }
 
+/// Two cubes of 0.1 m, the second 50 mm inside the first along x. They keep 1 mm, so each moves 51/24 mm a frame.
+#[test]
+fn bodies_that_start_inside_each_other_come_apart_evenly_in_twelve_frames() {
+    let second = || block([3, 2, 2], [0.05, 0.0, 0.0], [0.1; 3]);
+    let frames = simulating(cube()).input(BODIES, second()).set(GRAVITY, [0.0; 3]).frames(1..=24);
+    // All particles of the first but the middle one are points of its surface.
+    let first = cube().point_count() - 1;
+    let reach = |frame: &BenchResult, axis: usize, of: std::ops::Range<usize>| {
+        let points = &frame.mesh().positions()[of];
+        let along = points.iter().map(|p| f64::from(p[axis]));
+        along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
+    };
+    assert!((frames[0].metrics["deepest_overlap"] - 0.051).abs() < 1e-6, "{:?}", frames[0].metrics);
+    // Inside are one of the first, in the middle of its face, and two of the second. All others lie on faces of the other
+    // body: the nine of the face at x = 0.1; and nine each at x = 0.05 and 0.083.
+    assert_eq!((frames[0].metrics["points_inside"], frames[0].metrics["started_inside"]), (3.0, 27.0));
+    for (over, frame) in frames.iter().enumerate() {
+        let all = frame.mesh().point_count();
+        let apart = reach(frame, 0, first..all)[0] - reach(frame, 0, 0..first)[1];
+        let even = -0.05 + 0.051 * (over as f64).min(12.0) / 12.0;
+        // Contacts give way by up to 1 mm, and nothing slows bodies that are pushed.
+        assert!(apart > even - 1e-3 && (over > 12 || apart < even + 2e-3), "{over}: {apart} {even}");
+        for axis in [1, 2] {
+            let [low, high] = reach(frame, axis, 0..all);
+            assert!(low.abs() < 1e-3 && (high - 0.1).abs() < 1e-3, "{over}: no shear, {low} {high}");
+        }
+        assert_eq!(frame.metrics["deepest_penetration"], 0.0, "{over}: {:?}", frame.metrics);
+    }
+    assert_eq!(frames[13].metrics["points_inside"], 0.0, "{:?}", frames[13].metrics);
+    assert!((frames[13].metrics["volume_ratio"] - 1.0).abs() < 0.01);
+}
+
+#[test]
+fn a_body_that_starts_in_a_collider_or_the_ground_is_pushed_out_evenly() {
+    let still = |bench: Bench| bench.set(GRAVITY, [0.0; 3]).set(STIFFNESS, 1e5.into()).frames(1..=16);
+    // Its lower 30 mm are in the box, or below the ground.
+    for bench in [
+        simulating(cube()).input(COLLIDERS, solid([-0.1, -0.27, -0.1], 0.3)),
+        simulating(cube()).set(GROUND, true).set(GROUND_HEIGHT, 0.03),
+    ] {
+        for (over, frame) in still(bench).iter().enumerate() {
+            let low = frame.mesh().positions().iter().map(|p| f64::from(p[1])).fold(f64::INFINITY, f64::min);
+            let even = 0.031 * (over as f64).min(12.0) / 12.0;
+            assert!(low > even - 1.2e-3 && (over > 12 || low < even + 1.2e-3), "{over}: {low} {even}");
+            assert!(over <= 12 || frame.metrics["deepest_overlap"] <= 1e-3, "{over}: {:?}", frame.metrics);
+        }
+    }
+}
+
+/// The collider is 0.4 mm beside the body, or 20 mm beside it with a point of the carried surface 5 mm inside.
+#[test]
+fn overlap_is_measured_on_the_points_that_are_returned() {
+    let overlap = |bench: Bench| bench.cook().metrics;
+    let beside = |x: f32| simulating(cube()).input(COLLIDERS, solid([x, -0.05, -0.05], 0.2));
+    let near = overlap(beside(0.1004));
+    assert!((near["deepest_overlap"] - 6e-4).abs() < 1e-6 && near["points_inside"] == 0.0, "{near:?}");
+    let fine = Component::mesh(vec![3], vec![0, 1, 2], vec![[0.0; 3], [0.125, 0.05, 0.05], [0.0, 0.1, 0.0]]).unwrap();
+    let carried = simulating(Geometry::from(cube()).with(fine)).input(COLLIDERS, solid([0.12, -0.05, -0.05], 0.2));
+    let carried = overlap(carried);
+    assert!((carried["deepest_overlap"] - 6e-3).abs() < 1e-6 && carried["points_inside"] == 1.0, "{carried:?}");
+    let above = overlap(simulating(cube()).set(GROUND, true).set(GROUND_HEIGHT, -2e-4));
+    assert!((above["deepest_overlap"] - 8e-4).abs() < 1e-9, "{above:?}");
+    assert_eq!(overlap(beside(0.2))["deepest_overlap"], 0.0);
+}
+
 #[test]
 fn how_well_a_body_carries_its_weight_is_published_where_something_holds_it_up() {
     let ratio = |bench: Bench| bench.frames([1, 2])[1].metrics.get("stiffness_to_weight").copied();

@@ -72,6 +72,11 @@ impl BodySkin {
         Ok(surfaces.into_iter().zip(touching).map(skin).collect())
     }
 
+    /// The particles that meet the ground, obstacles and other skins, ascending: those of the surface and those within.
+    pub fn particles(&self) -> &[u32] {
+        &self.touching
+    }
+
     /// Number of particles of the body, interior ones included.
     pub(super) fn len(&self) -> usize {
         self.rest.len()

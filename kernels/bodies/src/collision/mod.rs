@@ -17,9 +17,9 @@ mod body_skin;
 mod closest_point;
 mod coplanarity;
 mod edge;
-mod inside;
 mod motion;
 mod obstacle;
+mod overlap;
 mod pair;
 mod surface;
 mod swept;
@@ -34,6 +34,7 @@ use numerics::parallel;
 use numerics::tree::{Cuboid, TriangleTree};
 use numerics::vector::{DVec3, to_f32};
 pub use obstacle::{Ground, Obstacle};
+pub use overlap::{Overlap, OverlapPartner, Penetration, Separation};
 pub use pair::ContactParams;
 use std::sync::{Mutex, OnceLock};
 use surface::Positions;
@@ -124,19 +125,23 @@ pub struct CollisionScene<'a> {
     pub body_contact: Option<ContactParams>,
     /// Contact of skins with themselves; `None`: ignored.
     pub self_contact: Option<ContactParams>,
+    /// What is being pushed apart because it overlapped at the start.
+    pub separation: Option<Separation<'a>>,
 }
 
 impl ContactFinder for CollisionScene<'_> {
-    /// The order is: ground contacts by particle; those of each obstacle by particle, then by its own points, then by
-    /// edges; then pairs of bodies; then self-contacts.
+    /// The order is: ground contacts by particle; those of what is being pushed apart; those of each obstacle by
+    /// particle, then by its own points, then by edges; then pairs of bodies; then self-contacts.
     fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
         self.on_ground(query, out);
+        self.separate(query, out);
         let boxes = swept::swept_boxes(&[query.from, query.to]);
         if !self.obstacles.is_empty() {
-            for skin in self.skins {
+            for (index, skin) in self.skins.iter().enumerate() {
                 let faces = skin.faces.sweep(&boxes, 0.0);
                 let released = skin.released(query.from);
-                for obstacle in self.obstacles {
+                let meeting = |other: &usize| self.separating(index, OverlapPartner::Obstacle(*other)).is_none();
+                for obstacle in (0..self.obstacles.len()).filter(meeting).map(|other| &self.obstacles[other]) {
                     self.against_obstacle(query, (skin, &released), &boxes, &faces, obstacle, out);
                 }
             }
@@ -149,16 +154,23 @@ impl CollisionScene<'_> {
     fn on_ground(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
         let Some(ground) = self.ground else { return };
         let up = DVec3::from(ground.up);
-        for particle in self.skins.iter().flat_map(|skin| &skin.touching) {
-            let height = |x: &[[f64; 3]]| up.dot(&DVec3::from(x[*particle as usize])) - ground.height;
-            if height(query.from).min(height(query.to)) <= REACH * ground.thickness {
+        for (index, skin) in self.skins.iter().enumerate() {
+            let rising = self.separating(index, OverlapPartner::Ground);
+            for particle in &skin.touching {
+                let height = |x: &[[f64; 3]]| up.dot(&DVec3::from(x[*particle as usize])) - ground.height;
+                let before = height(query.from);
+                if before.min(height(query.to)) > REACH * ground.thickness {
+                    continue;
+                }
+                let depth = (ground.thickness - before).max(0.0);
+                let (allowed, speed) = rising.map_or((0.0, 0.0), |overlap| self.allowed(overlap, depth, query.times));
                 out.push(Contact {
                     particles: [*particle, 0, 0, 0],
                     weights: [1.0, 0.0, 0.0, 0.0],
                     normal: ground.up,
-                    offset: ground.height,
+                    offset: ground.height - allowed,
                     gap: ground.thickness,
-                    velocity: [0.0; 3],
+                    velocity: (up * speed).into(),
                     friction: ground.friction * self.friction_scale(&[*particle], &[1.0]),
                     jammed: false,
                 });

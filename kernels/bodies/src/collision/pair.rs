@@ -4,7 +4,7 @@ use super::body_skin::BodySkin;
 use super::edge;
 use super::swept::{self, BoxTree};
 use super::vertex::{self, ContactRules, MovingSurface};
-use super::{CollisionScene, REACH, collect_in_order};
+use super::{CollisionScene, OverlapPartner, REACH, collect_in_order};
 use crate::mass_spring::{Contact, ContactQuery};
 use numerics::tree::Cuboid;
 use numerics::vector::DVec3;
@@ -90,7 +90,8 @@ impl CollisionScene<'_> {
             let boxes = boxes(REACH * params.thickness);
             for second in 1..self.skins.len() {
                 for first in 0..second {
-                    if swept::overlap(&boxes[first].bounds, &boxes[second].bounds) {
+                    let meet = swept::overlap(&boxes[first].bounds, &boxes[second].bounds);
+                    if meet && self.separating(first, OverlapPartner::Skin(second)).is_none() {
                         pair([first, second], false, params).particles(&boxes[second], out);
                         pair([second, first], false, params).particles(&boxes[first], out);
                         pair([first, second], false, params).edges(&boxes[second], out);

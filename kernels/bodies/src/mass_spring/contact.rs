@@ -57,6 +57,15 @@ pub struct Contact {
     pub jammed: bool,
 }
 
+impl Contact {
+    /// Depth below its gap with particles at `x`, by the caller's indices, metres; negative above it.
+    pub(crate) fn depth(&self, x: &[[f64; 3]]) -> f64 {
+        let sides = self.particles.iter().zip(self.weights).filter(|side| side.1 != 0.0);
+        let at: DVec3 = sides.map(|(particle, weight)| DVec3::from(x[*particle as usize]) * weight).sum();
+        self.gap + self.offset - DVec3::from(self.normal).dot(&at)
+    }
+}
+
 /// A motion for which potential contacts are wanted: particles move linearly from `from` to `to`.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactQuery<'a> {

@@ -1,4 +1,4 @@
-//! Which points lie inside a closed surface.
+//! Which points lie inside a closed surface, and where they leave it in a given direction.
 //!
 //! Decided by exact winding numbers on a snap grid. A surface that faces inwards encloses nothing. Points are tested
 //! together with six others around them, at a distance that counts as touching: where surfaces touch, rounding would
@@ -6,6 +6,7 @@
 
 use super::grid::{GridPoint, SnapGrid};
 use super::winding::{Winding, WindingCounts};
+use numerics::vector::{DMat3, DVec3, to_f32, to_f64};
 
 /// A closed surface that faces outwards, and the depth from which points count as inside.
 pub(crate) struct Enclosure {
@@ -36,16 +37,11 @@ impl Enclosure {
 
     /// Sets `inside` for those of `candidates` (indices into `points`) that lie inside.
     pub(crate) fn mark(&self, points: &[[f64; 3]], candidates: &[u32], inside: &mut [bool]) {
-        let within = |point: &u32| {
-            let at = points[*point as usize];
-            (0..3).all(|axis| self.low[axis] <= at[axis] && at[axis] <= self.high[axis])
-        };
-        let near: Vec<u32> = candidates.iter().copied().filter(within).collect();
+        let near = self.near(points, candidates);
         if near.is_empty() {
             return;
         }
-        let Some(grid) = SnapGrid::around(&self.corners) else { return };
-        let grid_points: Vec<GridPoint> = self.corners.iter().map(|p| grid.grid_point(p.map(f64::from))).collect();
+        let Some((grid, grid_points)) = snapped(&self.corners) else { return };
         let shells = vec![0; self.triangles.len()];
         let winding = Winding::new(&grid_points, &self.triangles, &shells);
         let mut tally = WindingCounts::new();
@@ -57,13 +53,84 @@ impl Enclosure {
             let at = points[point as usize];
             let mut beside = (0..3).flat_map(|axis| [-self.depth, self.depth].map(|by| (axis, by)));
             inside[point as usize] |= encloses(at)
-                && beside.all(|(axis, by)| {
-                    let mut beside = at;
-                    beside[axis] += by;
-                    encloses(beside)
-                });
+                && (self.depth == 0.0
+                    || beside.all(|(axis, by)| {
+                        let mut beside = at;
+                        beside[axis] += by;
+                        encloses(beside)
+                    }));
         }
     }
+
+    /// Where those of `candidates` (indices into `points`) that lie inside leave the surface along a unit `direction`,
+    /// in their order.
+    pub(crate) fn exits(&self, points: &[[f64; 3]], candidates: &[u32], direction: DVec3) -> Vec<Exit> {
+        let near = self.near(points, candidates);
+        let Some(origin) = self.corners.first().map(|corner| to_f64(*corner)).filter(|_| !near.is_empty()) else {
+            return Vec::new();
+        };
+        let side = direction.cross(&if direction.x.abs() < 0.7 { DVec3::x() } else { DVec3::y() }).normalize();
+        let turn = DMat3::from_rows(&[side.transpose(), direction.cross(&side).transpose(), direction.transpose()]);
+        // Turned so that the direction is +z, that of the rays that winding numbers are counted on.
+        let turned: Vec<[f32; 3]> = self.corners.iter().map(|p| to_f32(turn * (to_f64(*p) - origin))).collect();
+        let Some((grid, grid_points)) = snapped(&turned) else { return Vec::new() };
+        let shells = vec![0; self.triangles.len()];
+        let winding = Winding::new(&grid_points, &self.triangles, &shells);
+        let mut crossed: Vec<(f64, u32, i32)> = Vec::new();
+        let exit = |point: u32| {
+            let at = turn * (DVec3::from(points[point as usize]) - origin);
+            crossed.clear();
+            winding.crossed(grid.grid_point(at.into()).map(i64::from), 1, |face, passed| {
+                let corners = self.triangles[face as usize].map(|corner| to_f64(turned[corner as usize]));
+                crossed.push((height_above(at, corners), face, passed));
+            });
+            crossed.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let mut left: i32 = crossed.iter().map(|(_, _, passed)| passed).sum();
+            if left <= 0 {
+                return None;
+            }
+            let last = crossed.iter().find(|(_, _, passed)| {
+                left -= passed;
+                left <= 0
+            });
+            last.map(|(height, face, _)| Exit { point, face: *face, distance: height.max(0.0) })
+        };
+        near.into_iter().filter_map(exit).collect()
+    }
+
+    /// Those of `candidates` that are within the bounding box.
+    fn near(&self, points: &[[f64; 3]], candidates: &[u32]) -> Vec<u32> {
+        let within = |point: &u32| {
+            let at = points[*point as usize];
+            (0..3).all(|axis| self.low[axis] <= at[axis] && at[axis] <= self.high[axis])
+        };
+        candidates.iter().copied().filter(within).collect()
+    }
+}
+
+/// Points on the finest grid that covers them.
+fn snapped(points: &[[f32; 3]]) -> Option<(SnapGrid, Vec<GridPoint>)> {
+    let grid = SnapGrid::around(points)?;
+    Some((grid, points.iter().map(|p| grid.grid_point(p.map(f64::from))).collect()))
+}
+
+/// Height of a triangle above a point, along z; its lowest corner's if the triangle is upright.
+fn height_above(at: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+    let normal = (b - a).cross(&(c - a));
+    let height = normal.dot(&(a - at)) / normal.z;
+    let (low, high) = (a.z.min(b.z).min(c.z) - at.z, a.z.max(b.z).max(c.z) - at.z);
+    if height.is_finite() { height.clamp(low, high) } else { low }
+}
+
+/// Where a point leaves a surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Exit {
+    /// Index of the point.
+    pub(crate) point: u32,
+    /// Index of the triangle that it passes.
+    pub(crate) face: u32,
+    /// Distance to there, metres.
+    pub(crate) distance: f64,
 }
 
 /// The lowest and highest coordinates of points; infinite, and inverted, without any.
@@ -97,6 +164,33 @@ mod tests {
     fn points_count_as_inside_from_a_depth_on() {
         let points = [[0.5; 3], [0.5, 0.5, 0.85], [0.5, 0.5, 0.95], [0.0, 0.5, 0.5], [0.5, 0.5, 1.5], [-3.0; 3]];
         assert_eq!(marked(&cube().1, &points), [true, true, false, false, false, false]);
+    }
+
+    /// Along the diagonal of a face, 0.5 from each of the planes that it leads to, and out of a shell around a cavity.
+    #[test]
+    fn points_leave_a_surface_where_their_line_first_comes_out() {
+        let (points, triangles) = cube();
+        let exits = |triangles: &[[u32; 3]], corners: &[[f64; 3]], at: [f64; 3], direction: DVec3| {
+            Enclosure::new(corners, triangles, 0.0).exits(&[at], &[0], direction)
+        };
+        let away = exits(&triangles, &points, [0.5; 3], DVec3::new(1.0, 1.0, 0.0).normalize());
+        assert!((away[0].distance - 0.5_f64.sqrt()).abs() < 1e-6, "{away:?}");
+        for (axis, faces) in [[10, 11], [6, 7], [2, 3]].into_iter().enumerate() {
+            let mut direction = DVec3::zeros();
+            direction[axis] = 1.0;
+            let away = exits(&triangles, &points, [0.3, 0.4, 0.45], direction);
+            let left = [0.7, 0.6, 0.55][axis];
+            assert!((away[0].distance - left).abs() < 1e-6 && faces.contains(&(away[0].face as usize)), "{away:?}");
+        }
+        assert_eq!(exits(&triangles, &points, [0.5, 0.5, 1.5], DVec3::z()), [], "it is outside");
+        // A cavity from 0.25 to 0.75.
+        let inner = points.iter().map(|p| p.map(|x| 0.25 + 0.5 * x));
+        let all: Vec<[f64; 3]> = points.iter().copied().chain(inner).collect();
+        let turned = triangles.iter().map(|[a, b, c]| [a + 8, c + 8, b + 8]);
+        let shell: Vec<[u32; 3]> = triangles.iter().copied().chain(turned).collect();
+        let away = exits(&shell, &all, [0.5, 0.5, 0.1], DVec3::z());
+        assert!((away[0].distance - 0.15).abs() < 1e-6, "into the cavity: {away:?}");
+        assert_eq!(exits(&shell, &all, [0.5; 3], DVec3::z()), [], "the cavity is outside");
     }
 
     #[test]

@@ -77,20 +77,28 @@ impl<'a> Winding<'a> {
     /// Winding numbers of all shells around the point `sum` ÷ `parts`, where `sum` adds up to 4 grid points.
     pub(super) fn around(&self, sum: [i64; 3], parts: i64, tally: &mut WindingCounts) {
         tally.clear();
+        self.crossed(sum, parts, |member, passed| {
+            let shell = self.shells[member as usize];
+            match tally.iter_mut().find(|(other, _)| *other == shell) {
+                Some((_, count)) => *count += passed,
+                None => tally.push((shell, passed)),
+            }
+        });
+        tally.retain(|(_, count)| *count != 0);
+    }
+
+    /// Calls `found` with each triangle that the ray from that point towards +z crosses, and 1 if it does so from
+    /// behind, −1 from the front.
+    pub(super) fn crossed(&self, sum: [i64; 3], parts: i64, mut found: impl FnMut(u32, i32)) {
         let square = |axis: usize| ((sum[axis] / parts) >> self.shift) as usize;
         let square = square(1) * self.across() + square(0);
         for member in &self.members[self.starts[square] as usize..self.starts[square + 1] as usize] {
             let corners = self.triangles[*member as usize].map(|corner| self.grid_points[corner as usize]);
             let passed = passed(corners, sum, parts);
             if passed != 0 {
-                let shell = self.shells[*member as usize];
-                match tally.iter_mut().find(|(other, _)| *other == shell) {
-                    Some((_, count)) => *count += passed,
-                    None => tally.push((shell, passed)),
-                }
+                found(*member, passed);
             }
         }
-        tally.retain(|(_, count)| *count != 0);
     }
 }
 

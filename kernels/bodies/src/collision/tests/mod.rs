@@ -6,6 +6,7 @@ use numerics::shapes;
 
 mod bodies;
 mod hand;
+mod overlap;
 mod soft;
 mod tunnelling;
 

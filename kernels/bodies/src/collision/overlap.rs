@@ -1,0 +1,411 @@
+//! What lies inside something that should keep it out: at the start, when bodies are pushed apart, and in any result.
+//!
+//! A body that overlaps an obstacle or another body at the start would be held on the wrong side by contacts that keep
+//! whatever is beyond a surface there. For a number of frames such a pair therefore has other contacts: each point that
+//! lies inside is held below the surface that it leaves by, at a depth that falls at the same speed for all of them, so
+//! that the pair comes apart evenly and without shear. The direction is the one of shortest way out among those of a
+//! lattice and the one in which the common volume shrinks fastest.
+//!
+//! Points on the surface of a side are tested a little below it, so that surfaces that coincide count where what is
+//! below them overlaps.
+//!
+//! Limit: bodies of which only edges cross, with no point of one inside the other, are not seen.
+
+use super::surface::{Moment, TriangleSurface};
+use super::{BodySkin, ClosestPoint, CollisionScene, Obstacle};
+use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
+use crate::tets::{Enclosure, Exit, bounds};
+use numerics::tree::TriangleTree;
+use numerics::vector::{DVec3, to_f32};
+use serde::{Deserialize, Serialize};
+
+/// Depth in gaps below which a point that is returned counts as touching.
+const TOUCHING: f64 = 0.01;
+/// Distance in gaps below their surface at which its points are tested for overlap. In a corner of a box, which is tested
+/// along its diagonal, that is still deeper than a gap below each face.
+const BELOW: f64 = 2.0;
+
+/// What a body overlaps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum OverlapPartner {
+    /// The ground.
+    Ground,
+    /// The obstacle of this index.
+    Obstacle(usize),
+    /// The skin of this index.
+    Skin(usize),
+}
+
+/// A body and what it overlaps at the start.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Overlap {
+    /// Index of the body's skin; with another skin the lower one.
+    pub skin: usize,
+    /// What it overlaps.
+    pub partner: OverlapPartner,
+    /// Unit direction in which it is pushed out.
+    pub direction: [f64; 3],
+    /// How far it has to go until it keeps its distance, metres.
+    pub depth: f64,
+}
+
+/// How overlapping bodies are pushed apart in a frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Separation<'a> {
+    /// The overlaps at the start.
+    pub overlaps: &'a [Overlap],
+    /// Number of frames in which they are to come apart.
+    pub frames: u32,
+    /// Number of those that are over.
+    pub over: u32,
+    /// Length of the frame, seconds.
+    pub seconds: f64,
+}
+
+/// Where bodies are, relative to what should keep them out.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Penetration {
+    /// Number of points inside a closed obstacle or another skin.
+    pub inside: usize,
+    /// The largest distance to keep − signed distance of surfaces, metres; 0 if all keep their distance.
+    pub deepest: f64,
+}
+
+/// One side of an overlap: the points that may be inside the other, and its surface.
+struct Side<'a> {
+    points: &'a [[f64; 3]],
+    candidates: &'a [u32],
+    surface: &'a TriangleSurface,
+    /// The points, with those of the surface moved below it.
+    below: Vec<[f64; 3]>,
+    solid: Enclosure,
+}
+
+impl<'a> Side<'a> {
+    /// `touching` is the depth from which points count as inside.
+    fn new(
+        points: &'a [[f64; 3]],
+        candidates: &'a [u32],
+        surface: &'a TriangleSurface,
+        [gap, touching]: [f64; 2],
+    ) -> Self {
+        let below = below(points, surface, BELOW * gap);
+        Self { points, candidates, surface, below, solid: Enclosure::new(points, &surface.triangles, touching) }
+    }
+
+    /// Which of its points are inside the other.
+    fn within(&self, other: &Self) -> Vec<bool> {
+        let mut inside = vec![false; self.points.len()];
+        if other.surface.closed {
+            other.solid.mark(self.points, self.candidates, &mut inside);
+            other.solid.mark(&self.below, self.candidates, &mut inside);
+        }
+        inside
+    }
+
+    /// Where those of its points that are inside the other leave it in a direction.
+    fn exits(&self, other: &Self, candidates: &[u32], direction: DVec3) -> Vec<Exit> {
+        let mut exits = other.solid.exits(&self.below, candidates, direction);
+        for exit in &mut exits {
+            let [below, point] = [&self.below, self.points].map(|all| DVec3::from(all[exit.point as usize]));
+            exit.distance = (exit.distance + direction.dot(&(below - point))).max(0.0);
+        }
+        exits
+    }
+
+    /// Barycentric weights of the point of a triangle where a point of another side leaves it.
+    fn weights(&self, other: &Self, exit: &Exit, direction: DVec3) -> [f64; 3] {
+        let passed = DVec3::from(other.points[exit.point as usize]) + direction * exit.distance;
+        ClosestPoint::on(exit.face, passed, self.surface.corners(&Moment::of(self.points), exit.face)).weights
+    }
+
+    /// Sum of the area vectors of its triangles that are inside, given which of its points are.
+    fn area_within(&self, inside: &[bool]) -> DVec3 {
+        let at = Moment::of(self.points);
+        let faces = self.surface.triangles.iter().zip(0..);
+        let faces = faces.filter(|(corners, _)| corners.iter().all(|corner| inside[*corner as usize]));
+        faces.map(|(_, face)| self.surface.corners(&at, face)).map(|[a, b, c]| (b - a).cross(&(c - a))).sum()
+    }
+}
+
+impl CollisionScene<'_> {
+    /// The overlaps at the start of the frame, with particles at `x`, and the number of particles that lie inside a
+    /// closed obstacle, inside another skin, or below the ground: deeper than the distance to keep, so that touching
+    /// does not count. Obstacles that are open or face inwards have no inside.
+    pub fn overlaps(&self, x: &[[f64; 3]]) -> (Vec<Overlap>, usize) {
+        let (mut found, mut inside) = (Vec::new(), vec![false; x.len()]);
+        let mut mark = |marked: &[bool]| inside.iter_mut().zip(marked).for_each(|(all, own)| *all |= own);
+        let obstacles: Vec<_> = self.obstacles.iter().map(|obstacle| (obstacle, obstacle.at(0.0))).collect();
+        let thickness = self.body_contact.map_or(0.0, |contact| contact.thickness);
+        let boxes: Vec<_> = self.skins.iter().map(|skin| skin_bounds(skin, x)).collect();
+        for (skin, own) in self.skins.iter().enumerate() {
+            self.below_ground(skin, x, &mut found, &mut mark);
+            for (index, (obstacle, points)) in obstacles.iter().enumerate() {
+                if obstacle.surface.closed && overlap(&boxes[skin], &bounds(points.iter().copied())) {
+                    let gaps = [obstacle.thickness; 2];
+                    let side = Side::new(x, &own.touching, &own.surface, gaps);
+                    let other = Side::new(points, &obstacle.surface.vertices, &obstacle.surface, gaps);
+                    let ways = Ways { up: self.ground.map(|ground| ground.up.into()), gap: obstacle.thickness };
+                    let [marked, _] = ways.add(skin, OverlapPartner::Obstacle(index), [&side, &other], &mut found);
+                    mark(&marked);
+                }
+            }
+            for (index, next) in self.skins.iter().enumerate().skip(skin + 1) {
+                if self.body_contact.is_some() && overlap(&boxes[skin], &boxes[index]) {
+                    let [side, other] = [own, next].map(|of| Side::new(x, &of.touching, &of.surface, [thickness; 2]));
+                    let ways = Ways { up: None, gap: thickness };
+                    let marked = ways.add(skin, OverlapPartner::Skin(index), [&side, &other], &mut found);
+                    marked.iter().for_each(|marked| mark(marked));
+                }
+            }
+        }
+        (found, inside.iter().filter(|inside| **inside).count())
+    }
+
+    fn below_ground(&self, skin: usize, x: &[[f64; 3]], found: &mut Vec<Overlap>, mark: &mut impl FnMut(&[bool])) {
+        let Some(ground) = self.ground else { return };
+        let (mut inside, mut deepest) = (vec![false; x.len()], 0.0_f64);
+        for particle in &self.skins[skin].touching {
+            let depth = ground.height - DVec3::from(x[*particle as usize]).dot(&DVec3::from(ground.up));
+            inside[*particle as usize] = depth > ground.thickness;
+            deepest = deepest.max(depth);
+        }
+        mark(&inside);
+        if deepest > ground.thickness && deepest.is_finite() {
+            let depth = deepest + ground.thickness;
+            found.push(Overlap { skin, partner: OverlapPartner::Ground, direction: ground.up, depth });
+        }
+    }
+
+    /// The overlap of a skin and a partner that are being pushed apart.
+    pub(super) fn separating(&self, skin: usize, partner: OverlapPartner) -> Option<&Overlap> {
+        let separation = self.separation.filter(|separation| separation.over < separation.frames)?;
+        separation.overlaps.iter().find(|overlap| overlap.skin == skin && overlap.partner == partner)
+    }
+
+    /// The depth below its gap that a point may have at the end of the query, if it has `depth` at its start, and the
+    /// speed at which it falls, m/s.
+    pub(super) fn allowed(&self, overlap: &Overlap, depth: f64, times: [f64; 2]) -> (f64, f64) {
+        let Some(separation) = self.separation else { return (0.0, 0.0) };
+        let (whole, passed) = (f64::from(separation.frames), times[1] - times[0]);
+        let left = whole - f64::from(separation.over) - times[0];
+        let even = depth - overlap.depth * passed / whole;
+        let allowed = even.min(depth * (1.0 - passed / left)).max(0.0);
+        let seconds = separation.seconds * passed;
+        (allowed, if seconds > 0.0 { (depth - allowed) / seconds } else { 0.0 })
+    }
+
+    /// Contacts of the pairs that are being pushed apart.
+    pub(super) fn separate(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
+        let overlaps = self.separation.map_or(&[][..], |separation| separation.overlaps);
+        for overlap in overlaps.iter().filter(|overlap| self.separating(overlap.skin, overlap.partner).is_some()) {
+            match overlap.partner {
+                OverlapPartner::Ground => {}
+                OverlapPartner::Obstacle(index) => self.out_of_obstacle(query, overlap, &self.obstacles[index], out),
+                OverlapPartner::Skin(index) => self.out_of_skin(query, overlap, &self.skins[index], out),
+            }
+        }
+    }
+
+    fn out_of_skin(&self, query: &ContactQuery<'_>, overlap: &Overlap, other: &BodySkin, out: &mut Vec<Contact>) {
+        let Some(params) = self.body_contact else { return };
+        let direction = DVec3::from(overlap.direction);
+        let [first, other] = [&self.skins[overlap.skin], other]
+            .map(|skin| Side::new(query.from, &skin.touching, &skin.surface, [params.thickness, 0.0]));
+        for ([inner, outer], normal) in [([&first, &other], direction), ([&other, &first], -direction)] {
+            for exit in inner.exits(outer, inner.candidates, normal) {
+                let [a, b, c] = outer.surface.triangles[exit.face as usize];
+                let [u, v, w] = outer.weights(inner, &exit, normal);
+                let (allowed, speed) = self.allowed(overlap, exit.distance + params.thickness, query.times);
+                out.push(Contact {
+                    particles: [exit.point, a, b, c],
+                    weights: [1.0, -u, -v, -w],
+                    normal: normal.into(),
+                    offset: -allowed,
+                    gap: params.thickness,
+                    velocity: (normal * speed).into(),
+                    friction: 0.0,
+                    jammed: false,
+                });
+            }
+        }
+    }
+
+    fn out_of_obstacle(&self, query: &ContactQuery<'_>, overlap: &Overlap, other: &Obstacle, out: &mut Vec<Contact>) {
+        let first = &self.skins[overlap.skin];
+        let normal = DVec3::from(overlap.direction);
+        let [start, end] = query.times.map(|time| other.at(time));
+        let mut push = |exit: &Exit, (particles, weights): ([u32; 4], [f64; 4]), (points, shares): (&[u32], &[f64])| {
+            let (allowed, speed) = self.allowed(overlap, exit.distance + other.thickness, query.times);
+            let reached: DVec3 =
+                points.iter().zip(shares).map(|(point, share)| DVec3::from(end[*point as usize]) * *share).sum();
+            let velocity = other.velocity_of(query.times[1], points, shares) + normal * speed;
+            out.push(Contact {
+                particles,
+                weights,
+                normal: normal.into(),
+                offset: normal.dot(&reached) - allowed,
+                gap: other.thickness,
+                velocity: velocity.into(),
+                friction: 0.0,
+                jammed: false,
+            });
+        };
+        let gaps = [other.thickness, 0.0];
+        let body = Side::new(query.from, &first.touching, &first.surface, gaps);
+        let solid = Side::new(&start, &other.surface.vertices, &other.surface, gaps);
+        for exit in body.exits(&solid, body.candidates, normal) {
+            let shares = solid.weights(&body, &exit, normal);
+            let corners = other.surface.triangles[exit.face as usize];
+            push(&exit, ([exit.point, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]), (&corners, &shares));
+        }
+        for exit in solid.exits(&body, solid.candidates, -normal) {
+            let [a, b, c] = first.surface.triangles[exit.face as usize];
+            let [u, v, w] = body.weights(&solid, &exit, -normal);
+            push(&exit, ([a, b, c, 0], [u, v, w, 0.0]), (&[exit.point], &[1.0]));
+        }
+    }
+
+    /// Where particles at `x`, and more points of each skin, are at the end of the frame.
+    pub fn penetration(&self, x: &[[f64; 3]], more: &[Vec<[f64; 3]>]) -> Penetration {
+        let scene = CollisionScene { separation: None, ..*self };
+        let mut contacts = Vec::new();
+        scene.find(&ContactQuery { from: x, to: x, times: [1.0; 2] }, &mut contacts);
+        let depths = contacts.iter().map(|contact| contact.depth(x));
+        let mut found = Penetration { inside: 0, deepest: depths.fold(0.0, f64::max) };
+        let points: Vec<Vec<[f64; 3]>> = (0..self.skins.len())
+            .map(|skin| {
+                let own = self.skins[skin].touching.iter().map(|particle| x[*particle as usize]);
+                own.chain(more.get(skin).into_iter().flatten().copied()).collect()
+            })
+            .collect();
+        let boxes: Vec<_> = points.iter().map(|points| bounds(points.iter().copied())).collect();
+        if let Some(ground) = self.ground {
+            let heights = points.iter().flatten().map(|p| DVec3::from(*p).dot(&DVec3::from(ground.up)) - ground.height);
+            found.deepest = heights.fold(found.deepest, |deepest, height| deepest.max(ground.thickness - height));
+        }
+        let mut inside: Vec<Vec<bool>> = points.iter().map(|points| vec![false; points.len()]).collect();
+        for obstacle in self.obstacles {
+            let at = obstacle.at(1.0);
+            let solid = SolidShape { surface: &obstacle.surface, at: &at, gap: obstacle.thickness };
+            let around = bounds(at.iter().copied());
+            for (skin, points) in points.iter().enumerate().filter(|(skin, _)| overlap(&boxes[*skin], &around)) {
+                let particles = self.skins[skin].touching.len();
+                solid.depths(points, particles, &mut inside[skin], &mut found.deepest);
+            }
+        }
+        if let Some(contact) = self.body_contact {
+            for (index, skin) in self.skins.iter().enumerate() {
+                let solid = SolidShape { surface: &skin.surface, at: x, gap: contact.thickness };
+                let around = skin_bounds(skin, x);
+                let others = points.iter().enumerate();
+                for (other, points) in others.filter(|(other, _)| *other != index && overlap(&boxes[*other], &around)) {
+                    let particles = self.skins[other].touching.len();
+                    solid.depths(points, particles, &mut inside[other], &mut found.deepest);
+                }
+            }
+        }
+        found.inside = inside.iter().flatten().filter(|inside| **inside).count();
+        found
+    }
+}
+
+/// A surface that keeps points out.
+struct SolidShape<'a> {
+    surface: &'a TriangleSurface,
+    at: &'a [[f64; 3]],
+    gap: f64,
+}
+
+impl SolidShape<'_> {
+    /// Marks the points that are `inside`, and raises `deepest` to the largest depth of a point below the gap. Of the
+    /// first `particles` of them, those outside are left to contacts, which know how near they are.
+    fn depths(&self, points: &[[f64; 3]], particles: usize, inside: &mut [bool], deepest: &mut f64) {
+        let all: Vec<u32> = (0..points.len() as u32).collect();
+        let mut within = vec![false; points.len()];
+        if self.surface.closed {
+            Enclosure::new(self.at, &self.surface.triangles, 0.0).mark(points, &all, &mut within);
+        }
+        let measured = |point: &u32| within[*point as usize] || *point as usize >= particles;
+        let measured: Vec<u32> = all.into_iter().filter(measured).collect();
+        if measured.is_empty() {
+            return;
+        }
+        let narrow = |p: &[f64; 3]| to_f32(DVec3::from(*p));
+        let corners: Vec<_> = self.at.iter().map(narrow).collect();
+        let tree = TriangleTree::build(&corners, &self.surface.triangles);
+        let from: Vec<_> = measured.iter().map(|point| narrow(&points[*point as usize])).collect();
+        for (point, closest) in measured.iter().zip(tree.closest_each(&from, f32::INFINITY)) {
+            let Some(distance) = closest.map(|closest| f64::from(closest.distance)) else { continue };
+            let is_within = within[*point as usize];
+            inside[*point as usize] |= is_within && distance > TOUCHING * self.gap;
+            *deepest = deepest.max(self.gap + if is_within { distance } else { -distance });
+        }
+    }
+}
+
+/// The ways in which a body may leave what it overlaps.
+struct Ways {
+    /// The upward direction of the ground, below which it is not pushed.
+    up: Option<DVec3>,
+    gap: f64,
+}
+
+impl Ways {
+    /// Adds the overlap of two sides, if there is one; returns which points of both are inside the other.
+    fn add(
+        &self,
+        skin: usize,
+        partner: OverlapPartner,
+        [side, other]: [&Side<'_>; 2],
+        found: &mut Vec<Overlap>,
+    ) -> [Vec<bool>; 2] {
+        let inside = [side.within(other), other.within(side)];
+        let [own, others] = [(side, &inside[0]), (other, &inside[1])].map(|(side, inside)| {
+            let all = side.candidates.iter().copied().filter(|point| inside[*point as usize]);
+            all.collect::<Vec<u32>>()
+        });
+        if own.is_empty() && others.is_empty() {
+            return inside;
+        }
+        let shrinks = other.area_within(&inside[1]) - side.area_within(&inside[0]);
+        let lattice = (0..27).filter(|k| *k != 13).map(|k| {
+            let axis = |k: i32| f64::from(k % 3 - 1);
+            DVec3::new(axis(k), axis(k / 3), axis(k / 9))
+        });
+        let depth = |direction: DVec3| {
+            let (out, past) = (side.exits(other, &own, direction), other.exits(side, &others, -direction));
+            out.iter().chain(&past).map(|exit| exit.distance).fold(0.0, f64::max)
+        };
+        let directions = std::iter::once(shrinks).chain(lattice).filter_map(|direction| direction.try_normalize(0.0));
+        let allowed = directions.filter(|direction| self.up.is_none_or(|up| direction.dot(&up) > -1e-9));
+        let ways = allowed.map(|direction| (depth(direction), direction));
+        let shortest = ways.reduce(|best, next| if next.0 < best.0 { next } else { best });
+        if let Some((depth, direction)) = shortest {
+            found.push(Overlap { skin, partner, direction: direction.into(), depth: depth + self.gap });
+        }
+        inside
+    }
+}
+
+/// Points, with those of a surface moved below it by a distance.
+fn below(points: &[[f64; 3]], surface: &TriangleSurface, distance: f64) -> Vec<[f64; 3]> {
+    let (at, mut below) = (Moment::of(points), points.to_vec());
+    for (corners, face) in surface.triangles.iter().zip(0..) {
+        for (k, corner) in corners.iter().enumerate() {
+            let point = at.position(*corner);
+            let weights = std::array::from_fn(|other| if other == k { 1.0 } else { 0.0 });
+            let outward = surface.outward(&at, &ClosestPoint { face, weights, point, distance: 0.0 });
+            below[*corner as usize] = (point - outward.try_normalize(0.0).unwrap_or_default() * distance).into();
+        }
+    }
+    below
+}
+
+fn skin_bounds(skin: &BodySkin, x: &[[f64; 3]]) -> [[f64; 3]; 2] {
+    bounds(skin.touching.iter().map(|particle| x[*particle as usize]))
+}
+
+fn overlap([low, high]: &[[f64; 3]; 2], [other_low, other_high]: &[[f64; 3]; 2]) -> bool {
+    (0..3).all(|axis| low[axis] <= other_high[axis] && other_low[axis] <= high[axis])
+}

@@ -1,0 +1,78 @@
+//! What starts inside something: found, and pushed apart along the shortest way, evenly.
+
+use super::bodies::block;
+use super::*;
+
+const THICKNESS: f64 = 1e-3;
+
+fn ground(height: f64) -> Option<Ground> {
+    Some(Ground { up: [0.0, 1.0, 0.0], height, thickness: THICKNESS, friction: 0.5 })
+}
+
+fn skin((points, tets, faces): &super::bodies::Block) -> BodySkin {
+    let links: Vec<[u32; 2]> = tets.iter().flat_map(|[a, b, c, d]| [[*a, *b], [*a, *c], [*a, *d]]).collect();
+    BodySkin::new(points, faces, &links).unwrap()
+}
+
+/// A cube of 0.1 m whose lower 20 mm are in a box as wide as it is long: up is the shortest way.
+#[test]
+fn a_body_leaves_an_obstacle_the_shortest_way() {
+    let body = block([4; 3], 0.025, [0.0; 3]);
+    let (points, triangles) = cuboid([1.0; 3]);
+    let points: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1] - 0.48, p[2]]).collect();
+    let obstacles = [Obstacle::new(&triangles, &[pose(0.0, &points)], 1.0, THICKNESS, 0.5).unwrap()];
+    let skins = [skin(&body)];
+    let scene = CollisionScene { skins: &skins, obstacles: &obstacles, ..CollisionScene::default() };
+    let (found, inside) = scene.overlaps(&body.0);
+    assert_eq!(inside, 25, "the lowest layer of particles");
+    let [Overlap { skin: 0, partner: OverlapPartner::Obstacle(0), direction, depth }] = found[..] else {
+        panic!("{found:?}")
+    };
+    assert!((depth - 0.021).abs() < 1e-7 && (direction[1] - 1.0).abs() < 1e-12, "{found:?}");
+
+    // In the second quarter of the fourth of twelve frames nothing has moved yet, so it has to catch up.
+    let separation = Some(Separation { overlaps: &found, frames: 12, over: 3, seconds: 0.04 });
+    let scene = CollisionScene { separation, ..scene };
+    let contacts = self::find(&scene, &body.0, &body.0, [0.25, 0.5]);
+    assert_eq!(contacts.len(), 25);
+    for contact in contacts {
+        // 21 mm below the gap, of which a quarter of a frame out of 8.75 goes now.
+        let left = 0.021 * (1.0 - 0.25 / 8.75);
+        assert!((contact.offset - (0.02 - left)).abs() < 1e-7 && contact.normal == [0.0, 1.0, 0.0], "{contact:?}");
+        assert!((contact.velocity[1] - (0.021 - left) / 0.01).abs() < 1e-6 && contact.friction == 0.0, "{contact:?}");
+    }
+    let separation = Some(Separation { overlaps: &found, frames: 12, over: 12, seconds: 0.04 });
+    let after = self::find(&CollisionScene { separation, ..scene }, &body.0, &body.0, [0.0, 1.0]);
+    assert!(after.iter().all(|contact| contact.friction > 0.0), "contacts are ordinary again");
+}
+
+#[test]
+fn overlaps_are_found_with_the_ground_and_other_bodies_only_where_they_are() {
+    let bodies = [block([2; 3], 0.05, [0.0; 3]), block([3, 2, 2], 0.05, [0.07, 0.01, 0.01])];
+    let first = bodies[0].0.len() as u32;
+    let all: Vec<[f64; 3]> = bodies.iter().flat_map(|body| &body.0).copied().collect();
+    let shifted: Vec<[u32; 3]> = bodies[1].2.iter().map(|face| face.map(|corner| corner + first)).collect();
+    let links: Vec<[u32; 2]> = (0..2)
+        .flat_map(|body| bodies[body].1.iter().map(move |tet| tet.map(|corner| corner + body as u32 * first)))
+        .flat_map(|[a, b, c, d]| [[a, b], [a, c], [a, d]])
+        .collect();
+    let skins = BodySkin::several(&all, &[&bodies[0].2, &shifted], &links).unwrap();
+    let body_contact = Some(ContactParams { thickness: THICKNESS, friction: 0.5 });
+    let scene = CollisionScene { skins: &skins, body_contact, ..CollisionScene::default() };
+    let (found, inside) = scene.overlaps(&all);
+    let [Overlap { skin: 0, partner: OverlapPartner::Skin(1), direction, depth }] = found[..] else {
+        panic!("{found:?}")
+    };
+    assert!(inside > 0 && direction[0] < -0.9 && (depth - 0.031).abs() < 2e-3, "{found:?}");
+    assert_eq!(CollisionScene { body_contact: None, ..scene }.overlaps(&all), (vec![], 0));
+    let below = CollisionScene { body_contact: None, ground: ground(0.005), ..scene }.overlaps(&all);
+    let [Overlap { skin: 0, partner: OverlapPartner::Ground, depth, .. }] = below.0[..] else { panic!("{below:?}") };
+    assert!((depth - 0.006).abs() < 1e-12 && below.1 == 9, "the second body begins above the ground: {below:?}");
+
+    // A point in the middle of the face of the first that is 30 mm inside the second.
+    let penetration = CollisionScene { ground: ground(0.0), ..scene }.penetration(&all, &[]);
+    assert!((penetration.deepest - 0.031).abs() < 1e-6 && penetration.inside >= 8, "{penetration:?}");
+    let extra = [vec![[0.0, -0.5, 0.0], [0.1, 0.05, 0.05]], vec![]];
+    let more = CollisionScene { ground: ground(0.0), ..scene }.penetration(&all, &extra);
+    assert!((more.deepest - 0.501).abs() < 1e-9 && more.inside == penetration.inside + 1, "{more:?}");
+}
