@@ -2,6 +2,7 @@
 
 mod attribute_expr;
 mod curve_attach;
+mod curve_deform;
 mod curve_in;
 mod curve_interpolate;
 mod curve_scatter;
@@ -20,6 +21,7 @@ use engine::node::Node;
 pub static NODES: &[&Node] = &[
     &attribute_expr::NODE,
     &curve_attach::NODE,
+    &curve_deform::NODE,
     &curve_in::NODE,
     &curve_interpolate::NODE,
     &curve_scatter::NODE,
