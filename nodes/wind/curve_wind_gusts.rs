@@ -15,8 +15,9 @@
 //! * A gust fades over its decay while it travels on.
 
 use crate::shared::direction::unit_direction;
+use crate::shared::group::{self, Group};
 use crate::shared::gust_control;
-use curves::gusts::{Control, Draw, Gust, Gusts, Plane, Sphere, evaluate};
+use curves::gusts::{Control, Draw, Gust, Gusts, Influence, Plane, Sphere, evaluate};
 use engine::prelude::*;
 use numerics::ramp::Ramp;
 use numerics::vector::DVec3;
@@ -72,6 +73,7 @@ params! { PARAMS:
          gusts add nothing.")
         .within(0.0, 1.0);
     SEED: Param<Seed> = Param::seed("Each seed gives other gusts.").when(is_asked);
+    GROUP: Param<Name> = group::param();
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The curves, with their `envelope` scaled by the gusts.");
@@ -108,6 +110,7 @@ pub(crate) static NODE: Node = Node::new(
     &gust_control::RAMP,
 ])
 .writes(&[&ENVELOPE])
+.attributes(|params| group::attributes(params, GROUP))
 .metrics(METRICS)
 .neutral(|params, wires| {
     let full = params.get(BASE) == 1.0 && params.get(FALLOFF).min() >= 0.0;
@@ -132,7 +135,10 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
         (incoming.is_none().then(|| vec![1.0; curves.point_count()]), 0)
     } else {
         let gusts = Gusts { base, falloff: &falloff, spheres: &spheres, controls: &controls, incoming };
-        let felt = evaluate(curves.positions(), &gusts);
+        let felt = match Group::of(&cx.get(GROUP), &curves)? {
+            None => evaluate(curves.positions(), &gusts),
+            Some(group) => influence_on(&group, &curves, &gusts),
+        };
         (Some(felt.values), felt.reached)
     };
     cx.publish(REACHED_POINTS, reached as f64);
@@ -140,6 +146,16 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
         curves.set(ENVELOPE, envelope)?;
     }
     Ok(OUT.with(curves))
+}
+
+/// The envelope where only the CVs of a group feel gusts.
+fn influence_on(group: &Group, curves: &Component, gusts: &Gusts<'_>) -> Influence {
+    let points: Vec<[f32; 3]> = group.cvs().map(|cv| curves.positions()[cv]).collect();
+    let own: Option<Vec<f32>> = gusts.incoming.map(|incoming| group.cvs().map(|cv| incoming[cv]).collect());
+    let felt = evaluate(&points, &Gusts { incoming: own.as_deref(), ..gusts.clone() });
+    let mut values = gusts.incoming.map_or_else(|| vec![1.0; curves.point_count()], <[f32]>::to_vec);
+    group.cvs().zip(felt.values).for_each(|(cv, value)| values[cv] = value);
+    Influence { values, reached: felt.reached }
 }
 
 fn controls(cx: &FrameCx) -> Result<Vec<Control>> {

@@ -22,6 +22,7 @@ use engine::prelude::*;
 use numerics::masked::Masked;
 use numerics::tree::TriangleTree;
 
+use crate::shared::group::{self, Group, taken};
 use crate::shared::surface::tree;
 
 inputs! { INPUTS:
@@ -50,6 +51,7 @@ params! { PARAMS:
         "A face whose plane is this close to a CV does not shelter it, because the CV lies on that face. 0 only allows \
          for rounding; if roots lie deeper in the skin, set this to their depth.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.1);
+    GROUP: Param<Name> = group::param();
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The curves, with less wind where they are sheltered.");
@@ -72,6 +74,7 @@ pub(crate) static NODE: Node = Node::new(
 .outputs(&[&OUT])
 .reads(&[&P, &ENVELOPE])
 .writes(&[&ENVELOPE, &SHIELDED])
+.attributes(|params| group::attributes(params, GROUP))
 .metrics(METRICS)
 .neutral(|params, wires| match params {
     _ if wires.count(&COLLIDERS) == 0 => Some("no collider is wired"),
@@ -93,12 +96,19 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let mut curves = cx.edit(CURVES);
     let amount = cx.get(SHIELD).value;
     let looks = amount > 0.0 || cx.wants(SHIELDED);
-    let shielded = if looks { sheltered(cx, &curves) } else { vec![0.0; curves.element_count()] };
+    let group = Group::of(&cx.get(GROUP), &curves)?;
+    let (shielded, cast) = match &group {
+        _ if !looks => (vec![0.0; curves.element_count()], 0),
+        None => (sheltered(cx, &curves), curves.point_count()),
+        Some(group) => sheltered_of(cx, group, &curves)?,
+    };
 
     cx.publish(SHELTERED, shielded.iter().filter(|share| **share > 0.0).count() as f64);
-    cx.publish(RAYS, if looks { curves.point_count() as f64 } else { 0.0 });
+    cx.publish(RAYS, cast as f64);
     if amount > 0.0 || curves.get(ENVELOPE).is_none() {
-        let envelope = scaled(&curves, &shielded, cx.mask(SHIELD, &curves)?);
+        let shield = cx.mask(SHIELD, &curves)?;
+        let factors = group.map(|group| group.factors(shield));
+        let envelope = scaled(&curves, &shielded, group::masked(shield, factors.as_deref()));
         curves.set(ENVELOPE, envelope)?;
     }
     if cx.wants(SHIELDED) {
@@ -119,6 +129,17 @@ fn sheltered(cx: &Cx, curves: &Component) -> Vec<f32> {
         skin_gap: cx.get(SKIN_GAP),
     };
     shield(curves.runs().starts(), curves.positions(), &colliders, &how)
+}
+
+/// The same where only the curves of a group are looked at, and the number of CVs that look.
+fn sheltered_of(cx: &Cx, group: &Group, curves: &Component) -> Result<(Vec<f32>, usize)> {
+    let chosen = group.curves(curves.runs());
+    let part = taken(curves, &chosen)?;
+    let mut shielded = vec![0.0; curves.element_count()];
+    for (curve, share) in chosen.into_iter().zip(sheltered(cx, &part)) {
+        shielded[curve as usize] = share;
+    }
+    Ok((shielded, part.point_count()))
 }
 
 /// A collider, and what is computed once while it does not move.
@@ -200,6 +221,31 @@ mod tests {
         gusts.part_mut(Kind::Curves).unwrap().set(ENVELOPE, vec![0.5, 0.25, 2.0, 0.0, 0.5, 0.5]).unwrap();
         let out = bench(&NODE).input(CURVES, gusts).input(COLLIDERS, wall(1.0)).cook();
         assert_eq!(out.curves().get(ENVELOPE), Some(&[0.25, 0.125, 1.0, 0.0, 0.5, 0.5][..]));
+    }
+
+    #[test]
+    fn outside_a_group_nothing_is_sheltered() {
+        let with = |name: &str, rows: [i32; 2], tips: [f32; 6]| {
+            let mut curves = curves(1.0);
+            let part = curves.part_mut(Kind::Curves).unwrap();
+            part.set(ENVELOPE, vec![0.5, 0.25, 2.0, -0.0, 0.5, 0.5]).unwrap();
+            part.set(Attr::<i32>::element("some"), rows.to_vec()).unwrap();
+            part.set(Attr::<f32>::point("tips"), tips.to_vec()).unwrap();
+            bench(&NODE).input(CURVES, curves).input(COLLIDERS, wall(1.0)).set(GROUP, name.into()).cook()
+        };
+        let tips = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+        let out = with("some", [0, 1], tips);
+        assert_eq!(out.curves().get(SHIELDED), Some(&[0.0, 0.0][..]));
+        let same = |a: &[f32], b: [f32; 6]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
+        assert!(same(out.curves().get(ENVELOPE).unwrap(), [0.5, 0.25, 2.0, -0.0, 0.5, 0.5]));
+        assert_eq!((out.metrics["sheltered_curves"], out.metrics["rays"]), (0.0, 2.0));
+        let out = with("some", [7, 0], tips);
+        assert_eq!(out.curves().get(SHIELDED), Some(&[0.5, 0.0][..]));
+        assert_eq!(out.curves().get(ENVELOPE), Some(&[0.25, 0.125, 1.0, 0.0, 0.5, 0.5][..]));
+        // Of a curve with one CV in the group, half of whose CVs see the wall, that CV alone loses wind.
+        let out = with("tips", [0, 0], tips);
+        assert_eq!(out.curves().get(SHIELDED), Some(&[0.5, 0.0][..]));
+        assert!(same(out.curves().get(ENVELOPE).unwrap(), [0.5, 0.25, 1.0, -0.0, 0.5, 0.5]));
     }
 
     #[test]

@@ -366,3 +366,30 @@ fn ten_thousand_gusts_terminate() {
     assert!(out.metrics["active_gusts"] > 3000.0);
     assert!(envelope(&out).iter().all(|x| *x == 1.0));
 }
+
+#[test]
+fn outside_a_group_the_envelope_keeps_its_bits() {
+    let incoming: Vec<f32> = (0..180).map(|cv| cv as f32 / 180.0).collect();
+    let mut curves = field(6);
+    let part = curves.part_mut(Kind::Curves).unwrap();
+    part.set(ENVELOPE, incoming.clone()).unwrap();
+    part.set(Attr::<i32>::element("third"), (0..36).map(|curve| curve % 3).collect()).unwrap();
+    part.set(Attr::<f32>::point("tips"), (0..180).map(|cv| if cv % 5 == 4 { 0.5 } else { 0.0 }).collect()).unwrap();
+    let all = single(curves.clone()).at(20.0).cook();
+    for name in ["third", "tips"] {
+        let inside = |cv: usize| if name == "third" { !(cv / 5).is_multiple_of(3) } else { cv % 5 == 4 };
+        let out = single(curves.clone()).set(GROUP, name.into()).at(20.0).cook();
+        for (cv, value) in envelope(&out).iter().enumerate() {
+            let expected = if inside(cv) { envelope(&all)[cv] } else { incoming[cv] };
+            assert_eq!(value.to_bits(), expected.to_bits(), "{name}, CV {cv}");
+        }
+        assert!((1.0..all.metrics["reached_points"]).contains(&out.metrics["reached_points"]));
+    }
+    // Without an envelope, what is outside has 1.
+    let part = curves.part_mut(Kind::Curves).unwrap();
+    part.remove(Owner::Point, ENVELOPE.name);
+    let out = single(curves.clone()).set(GROUP, "tips".into()).at(20.0).cook();
+    assert!(envelope(&out).iter().enumerate().all(|(cv, value)| cv % 5 == 4 || *value == 1.0));
+    let error = single(curves).set(GROUP, "tipz".into()).at(20.0).try_cook().unwrap_err();
+    assert_eq!(error.to_string(), "`group` is `tipz`, which the curves do not have; did you mean `tips`?");
+}
