@@ -49,8 +49,8 @@ params! { PARAMS:
         "How much of the guides' turn is followed: 0 only carries curves along with their roots, 1 turns them as the \
          guides turn. Lengths are kept at any value.").within(0.0, 1.0);
     KEEP_OUT: Param<bool> = Param::bool("keep_out", true,
-        "Keeps curves out of the skin that would enter it because their guides are some way off. Curves that cross it at \
-         rest are left as they are.");
+        "Keeps curves out of the skin that would enter it because their guides are some way off. Roots of curves that \
+         cross it at rest are lifted out of it first.");
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The groom, deformed as the guides are. Lengths are kept.");
@@ -62,9 +62,8 @@ metrics! { METRICS:
         .warn_above(0.0, "No turn frees these segments from the skin. Raise `offset_root` of the guides' \
             Curve_Wind_Collision, which lifts roots out of creases.");
     STARTED_INSIDE = Metric::new("started_inside", Unit::None,
-        "Curves in the skin that cross it at rest too, so that `keep_out` leaves them as they are.")
-        .warn_above(0.0, "These curves cross the skin in their rest shape, so `keep_out` does not act on them. Lift their \
-            roots to the surface, or comb them out of it.");
+        "Curves that would enter the skin and cross it at rest too, even with their roots lifted out of it: they are turned \
+         out of it as far as possible.");
     UNGUIDED = Metric::new("unguided", Unit::None, "Curves without a guide within `radius`.");
     FAR_ROOTS = Metric::new("far_roots", Unit::None,
         "Curves and guides whose roots are farther from the skin at rest than they are long.")

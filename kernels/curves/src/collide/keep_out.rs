@@ -5,7 +5,10 @@
 //! from their rest shape until they meet it, as in [`super::collide()`], and then as far back towards their goal as they
 //! stay free: a curve that only just enters the skin moves by little, so that none jumps as it touches it.
 //!
-//! Curves that cross the skin at rest are left as they are. The start of a curve, which touches the skin, is not tested.
+//! A curve whose root has been lifted off the skin starts from its rest shape lifted as far. One whose rest shape crosses the
+//! skin is lifted until its root is outside by the gap, and turned out of the skin as far as possible. Of a curve that is
+//! not lifted the start, which touches the skin, is not tested. Surfaces are obstacles, not volumes: a curve wholly inside
+//! stays there.
 
 use super::crossing::first_crossing;
 use super::hair::{SKIPPED_GAPS, part_way};
@@ -29,7 +32,11 @@ const TASK_CURVES: usize = 256;
 const SETTLED_CURVES: usize = 64;
 
 /// Halvings of the turn between a curve's goal and where its collision left it.
-const HALVINGS: usize = 6;
+const HALVINGS: usize = 4;
+
+/// Height of a root, in gaps, from which on its curve is tested from its root on: from a height h a segment turns by an arc
+/// of π/2·h before it meets a plane, which is more than the gap.
+const LIFTED: f64 = 0.7;
 
 /// Number of successive segments that share one query of the tree.
 const GATHERED_SEGMENTS: usize = 6;
@@ -43,7 +50,7 @@ pub struct KeepOut<'a> {
     pub rest: &'a [Vec3],
     /// How the skin has moved and turned each root since rest; `None` if it has not.
     pub poses: Option<&'a [RootPose]>,
-    /// Arc length kept from contacts, metres. The first five of a curve are not tested.
+    /// Arc length kept from contacts, metres. The first five of a curve whose root is not lifted are not tested.
     pub gap: f64,
     /// What is known of these curves on this skin.
     pub clearance: &'a Clearance,
@@ -63,7 +70,7 @@ pub struct Clearance {
 pub struct KeptOut {
     /// Curves that had entered the skin.
     pub kept_out: u64,
-    /// Curves left in the skin because they cross it at rest.
+    /// Curves among them that cross the skin at rest, even with their roots lifted.
     pub started_inside: u64,
     /// Segments of the curves kept out that still cross the skin.
     pub crossings_left: u64,
@@ -86,43 +93,78 @@ pub(super) fn keep_out_on(path: Path, starts: &[u32], points: &mut [Vec3], how: 
     let half_spaces = how.clearance.used(path, starts, how);
     let tasks = (0..curves).step_by(TASK_CURVES).map(|first| first..curves.min(first + TASK_CURVES));
     let entered = parallel::map(tasks, |_, curves| entering(path, curves, starts, points, how, half_spaces));
-    let (mut kept, mut curves) = (KeptOut::default(), Vec::new());
-    for (curve, at_rest) in parallel::concat(entered) {
-        if at_rest {
-            kept.started_inside += 1;
-        } else {
-            curves.push(curve as usize);
+    let entered = parallel::concat(entered);
+    let mut kept =
+        KeptOut { started_inside: entered.iter().map(|one| u64::from(one.at_rest)).sum(), ..KeptOut::default() };
+    for lifted in [false, true] {
+        let curves: Vec<Entering> = entered.iter().filter(|one| one.lifted == lifted).copied().collect();
+        if !curves.is_empty() {
+            turn_out(path, starts, points, how, &curves, &mut kept);
         }
     }
-    if curves.is_empty() {
-        return kept;
+    kept
+}
+
+/// A curve that crosses the skin.
+#[derive(Clone, Copy)]
+struct Entering {
+    curve: u32,
+    /// Whether it does so at rest.
+    at_rest: bool,
+    /// Whether its root is off the skin.
+    lifted: bool,
+    /// What lifts it.
+    shift: DVec3,
+}
+
+/// Moves CVs; without a shift they keep their bits.
+fn shifted(cvs: &mut [Vec3], shift: &DVec3) {
+    if *shift != DVec3::zeros() {
+        cvs.iter_mut().for_each(|cv| *cv = to_f32(to_f64(*cv) + shift));
     }
+}
+
+/// Turns curves, all or none of them lifted, out of the skin.
+fn turn_out(
+    path: Path,
+    starts: &[u32],
+    points: &mut [Vec3],
+    how: &KeepOut<'_>,
+    curves: &[Entering],
+    kept: &mut KeptOut,
+) {
+    let lifted = curves[0].lifted;
+    let range = |one: &Entering| starts[one.curve as usize] as usize..starts[one.curve as usize + 1] as usize;
     let (mut own, mut goal, mut rest) = (vec![0], Vec::new(), Vec::new());
-    for curve in &curves {
-        let cvs = starts[*curve] as usize..starts[*curve + 1] as usize;
+    for one in curves {
+        let (cvs, first) = (range(one), goal.len());
         goal.extend_from_slice(&points[cvs.clone()]);
+        shifted(&mut goal[first..], &one.shift);
         rest.resize(goal.len(), [0.0; 3]);
-        how.write_rest(*curve, cvs.clone(), &mut rest[goal.len() - cvs.len()..]);
+        how.write_rest(one.curve as usize, cvs, goal[first], &mut rest[first..]);
         own.push(goal.len() as u32);
     }
     let obstacles = [how.skin.tree];
-    let collided = collide(&own, &rest, &goal, &how.collision(&obstacles));
-    let found =
-        Entered { starts: &own, rest: &rest, goal: &goal, free: &collided.points, crossings: &collided.crossings };
+    let collided = collide(&own, &rest, &goal, &how.collision(&obstacles, lifted));
+    let found = Entered {
+        starts: &own,
+        rest: &rest,
+        goal: &goal,
+        free: &collided.points,
+        crossings: &collided.crossings,
+        untested: how.untested(lifted),
+    };
     let tasks = (0..curves.len()).step_by(SETTLED_CURVES).map(|first| first..curves.len().min(first + SETTLED_CURVES));
-    let settled = parallel::map(tasks, |_, curves| settle(path, curves, &found, how));
+    let settled = parallel::map(tasks, |_, curves| settle(path, curves, &found, how.skin.tree));
     let settled = parallel::concat(settled);
-    for (curve, ends) in curves.iter().zip(own.windows(2)) {
-        let (mine, now) = (ends[0] as usize..ends[1] as usize, starts[*curve] as usize..starts[*curve + 1] as usize);
+    for (one, ends) in curves.iter().zip(own.windows(2)) {
+        let (mine, now) = (ends[0] as usize..ends[1] as usize, range(one));
         kept.kept_out += u64::from(settled[mine.clone()] != points[now.clone()]);
         points[now].copy_from_slice(&settled[mine]);
     }
-    KeptOut {
-        crossings_left: collided.crossings_left,
-        // Those that settled have lengths as exact.
-        length_error: collided.length_error,
-        ..kept
-    }
+    kept.crossings_left += collided.crossings_left;
+    // Those that settled have lengths as exact.
+    kept.length_error = kept.length_error.max(collided.length_error);
 }
 
 /// Curves that entered the skin.
@@ -134,17 +176,19 @@ struct Entered<'a> {
     /// As the collision left them, and the number of segments that cross the skin.
     free: &'a [Vec3],
     crossings: &'a [i32],
+    /// Length at the start of each that is not tested.
+    untested: f64,
 }
 
 kernel! {
     /// The shapes of `curves`, as near to their goals as they stay free.
-    fn settle(curves: Range<usize>, entered: &Entered<'_>, how: &KeepOut<'_>) -> Vec<Vec3> = settle_task;
+    fn settle(curves: Range<usize>, entered: &Entered<'_>, skin: &TriangleTree) -> Vec<Vec3> = settle_task;
 }
 
 #[inline(always)]
-fn settle_task(curves: Range<usize>, entered: &Entered<'_>, how: &KeepOut<'_>) -> Vec<Vec3> {
+fn settle_task(curves: Range<usize>, entered: &Entered<'_>, skin: &TriangleTree) -> Vec<Vec3> {
     let mut out = entered.free[entered.starts[curves.start] as usize..entered.starts[curves.end] as usize].to_vec();
-    let (base, untested) = (entered.starts[curves.start] as usize, how.untested());
+    let (base, untested) = (entered.starts[curves.start] as usize, entered.untested);
     let (mut nearby, mut pose) = (Nearby::default(), Vec::new());
     for curve in curves {
         let cvs = entered.starts[curve] as usize..entered.starts[curve + 1] as usize;
@@ -159,7 +203,7 @@ fn settle_task(curves: Range<usize>, entered: &Entered<'_>, how: &KeepOut<'_>) -
         for _ in 0..HALVINGS {
             let share = 0.5 * (crossing + clear);
             pose_between(goal, free, share, &mut pose);
-            if crosses(&pose, [outside, tested_start(&pose, untested)], how.skin.tree, &mut nearby) {
+            if crosses(&pose, [outside, tested_start(&pose, untested)], skin, &mut nearby) {
                 crossing = share;
             } else {
                 clear = share;
@@ -187,8 +231,8 @@ fn pose_between(from: &[Vec3], to: &[Vec3], share: f64, pose: &mut Vec<Vec3>) {
 
 impl KeepOut<'_> {
     /// Length at the start of a curve that is not tested.
-    fn untested(&self) -> f64 {
-        SKIPPED_GAPS * self.gap
+    fn untested(&self, lifted: bool) -> f64 {
+        if lifted { 0.0 } else { SKIPPED_GAPS * self.gap }
     }
 
     /// The root of a curve's rest shape, its CV `cv`, on the skin as it is now.
@@ -198,15 +242,17 @@ impl KeepOut<'_> {
         to_f64(to_f32(to_f64(self.rest[cv]) + moved))
     }
 
-    /// The rest shape of a curve on the skin as it is now.
-    fn write_rest(&self, curve: usize, cvs: Range<usize>, out: &mut [Vec3]) {
+    /// The rest shape of a curve on the skin as it is now, moved so that it starts at `root`.
+    fn write_rest(&self, curve: usize, cvs: Range<usize>, root: Vec3, out: &mut [Vec3]) {
         match self.poses {
             Some(poses) => attach_curve(&poses[curve], &self.rest[cvs], out),
             None => out.copy_from_slice(&self.rest[cvs]),
         }
+        let moved = to_f64(root) - to_f64(out[0]);
+        shifted(out, &moved);
     }
 
-    fn collision<'o>(&self, obstacles: &'o [&'o TriangleTree]) -> Collide<'o>
+    fn collision<'o>(&self, obstacles: &'o [&'o TriangleTree], lifted: bool) -> Collide<'o>
     where
         Self: 'o,
     {
@@ -216,7 +262,8 @@ impl KeepOut<'_> {
             method: ContactMethod::Exact,
             coherence: 0.0,
             gap: self.gap,
-            offset_root: 0.0,
+            // Lifts nothing without a skin; it says whether the start of a curve is tested.
+            offset_root: if lifted { self.gap } else { 0.0 },
             offset_scale: None,
             loft: 0.0,
             at_rest: None,
@@ -248,12 +295,13 @@ kernel! {
 #[inline(always)]
 fn look_up_task(first: usize, starts: &[u32], how: &KeepOut<'_>, out: &mut [HalfSpace]) {
     let obstacles = [how.skin.tree];
-    let collision = Collide { skin: Some(how.skin), ..how.collision(&obstacles) };
+    let collision = Collide { skin: Some(how.skin), ..how.collision(&obstacles, false) };
     let mut rest = Vec::new();
     for (curve, out) in (first..).zip(out) {
         let cvs = starts[curve] as usize..starts[curve + 1] as usize;
         rest.resize(cvs.len(), [0.0; 3]);
-        how.write_rest(curve, cvs, &mut rest);
+        let root = to_f32(how.root(curve, cvs.start));
+        how.write_rest(curve, cvs, root, &mut rest);
         if rest.len() >= 2 && is_finite(&rest) {
             *out = HalfSpace::of(&rest, &DVec3::zeros(), 0.0, &collision);
         }
@@ -268,7 +316,7 @@ kernel! {
         points: &[Vec3],
         how: &KeepOut<'_>,
         half_spaces: &[HalfSpace],
-    ) -> Vec<(u32, bool)> = entering_task;
+    ) -> Vec<Entering> = entering_task;
 }
 
 #[inline(always)]
@@ -278,7 +326,7 @@ fn entering_task(
     points: &[Vec3],
     how: &KeepOut<'_>,
     half_spaces: &[HalfSpace],
-) -> Vec<(u32, bool)> {
+) -> Vec<Entering> {
     let (mut entered, mut rest) = (Vec::new(), Vec::new());
     let mut nearby = Nearby::default();
     for curve in curves {
@@ -287,16 +335,25 @@ fn entering_task(
         if now.len() < 2 || !is_finite(now) {
             continue;
         }
+        let root = how.root(curve, cvs.start);
+        let lifted = (to_f64(now[0]) - root).norm() >= LIFTED * how.gap;
+        let untested = how.untested(lifted);
         if let Some(half_space) = half_spaces.get(curve)
-            && frees(half_space, &how.root(curve, cvs.start), now, how.untested())
+            && frees(half_space, &root, now, untested)
         {
             continue;
         }
         rest.resize(now.len(), [0.0; 3]);
-        how.write_rest(curve, cvs, &mut rest);
-        let (outside, start) = (tested_start(&rest, how.untested()), tested_start(now, how.untested()));
+        how.write_rest(curve, cvs, now[0], &mut rest);
+        let (outside, start) = (tested_start(&rest, untested), tested_start(now, untested));
         if crosses(now, [outside, start], how.skin.tree, &mut nearby) {
-            entered.push((curve as u32, crosses(&rest, [outside; 2], how.skin.tree, &mut nearby)));
+            let mut one = Entering { curve: curve as u32, at_rest: false, lifted, shift: DVec3::zeros() };
+            if crosses(&rest, [outside; 2], how.skin.tree, &mut nearby) {
+                (one.lifted, one.shift) = (true, how.skin.lift(now[0], how.gap).shift);
+                shifted(&mut rest, &one.shift);
+                one.at_rest = crosses(&rest, [Some(rest[0]); 2], how.skin.tree, &mut nearby);
+            }
+            entered.push(one);
         }
     }
     entered

@@ -180,7 +180,12 @@ fn weighted(guide: &GuideWeight) -> DMat3 {
     if [x, y, z] == [0.0; 3] {
         return DMat3::from_diagonal_element(weight);
     }
-    // Its rounding to f32 would scale.
-    let rotation = DQuat::new_normalize(Quaternion::new(w, x, y, z));
-    DMat3::from_columns(&[DVec3::x(), DVec3::y(), DVec3::z()].map(|axis| rotation * axis * weight))
+    // Divided by its squared length, which rounding to f32 made unequal to 1.
+    let twice = 2.0 / (x * x + y * y + z * z + w * w);
+    let rows = [
+        [1.0 - twice * (y * y + z * z), twice * (x * y - w * z), twice * (x * z + w * y)],
+        [twice * (x * y + w * z), 1.0 - twice * (x * x + z * z), twice * (y * z - w * x)],
+        [twice * (x * z - w * y), twice * (y * z + w * x), 1.0 - twice * (x * x + y * y)],
+    ];
+    DMat3::from(rows).transpose() * weight
 }

@@ -71,9 +71,9 @@ fn hairs_blown_into_the_floor_end_on_it_and_the_others_keep_their_bits() {
         into += 1;
         assert!(now.iter().all(|cv| cv[1] >= -1e-7), "hair {hair}: {now:?}");
         // The collision stops the first segment at 0.2 rad, where its arc to contact is the gap at the end of the part
-        // that is not tested; from there the hair turns back until it is free by less than 1/64 of the turn.
+        // that is not tested; from there the hair turns back until it is free by less than 1/16 of the turn.
         let lowest = now[1..].iter().map(|cv| cv[1]).fold(1.0, f32::min);
-        assert!(lowest < 0.08 * 0.5 / 64.0, "hair {hair} does not reach the floor: {now:?}");
+        assert!(lowest < 0.08 * 0.5 / 16.0, "hair {hair} does not reach the floor: {now:?}");
         for ends in now.windows(2) {
             let length = (to_f64(ends[1]) - to_f64(ends[0])).norm();
             assert!((length - f64::from(STEP)).abs() < 1e-7);
@@ -122,16 +122,34 @@ fn a_hair_that_touches_the_skin_does_not_jump() {
     assert!(tip(80).y > 0.0 && tip(80).y < 2e-3);
 }
 
+/// One that dips into the floor at rest is turned out of it, and counted.
 #[test]
-fn hairs_that_cross_the_skin_at_rest_are_left_and_counted() {
+fn hairs_that_cross_the_skin_at_rest_are_turned_out() {
     let mesh = Mesh::floor();
-    let rest = vec![[0.0, 0.0, 0.0], [0.0, 0.05, 0.0], [0.0, -0.05, 0.0], [0.3, 0.1, 0.0], [0.3, 0.2, 0.0]];
-    let goal = vec![[0.0, 0.0, 0.0], [0.05, 0.0, 0.0], [0.05, -0.1, 0.0], [0.3, 0.1, 0.0], [0.3, 0.0, 0.0]];
+    let rest = vec![[0.0, 0.01, 0.0], [0.0, 0.05, 0.0], [0.02, -0.01, 0.0], [0.3, 0.1, 0.0], [0.3, 0.2, 0.0]];
+    let goal = vec![[0.0, 0.01, 0.0], [0.0, 0.05, 0.0], [0.04, -0.003_245_553, 0.0], [0.3, 0.1, 0.0], [0.3, 0.0, 0.0]];
     let (points, kept) = kept(&mesh, &[0, 3, 5], &rest, &goal, &Clearance::default());
-    assert_eq!(points[..3], goal[..3]);
-    // The second turns from above the floor to where it meets it, just above.
-    assert!(points[4][1] > 0.0 && points[4][1] < 1e-3, "{points:?}");
-    assert_eq!((kept.kept_out, kept.started_inside), (1, 1));
+    assert_eq!(points[..2], goal[..2]);
+    assert!(points[2][1] > 0.0 && points[4][1] > 0.0 && points[4][1] < 2e-3, "{points:?}");
+    assert_eq!((kept.kept_out, kept.started_inside, kept.crossings_left), (2, 1, 0));
+    assert!(kept.length_error < 1e-5);
+}
+
+/// A root below the floor is lifted a gap above it, and its hair then lies on it.
+#[test]
+fn hairs_with_their_roots_in_the_skin_are_lifted() {
+    let mesh = Mesh::floor();
+    let rest: Vec<Vec3> = (0..CVS).map(|k| [0.0, STEP * k as f32 - 0.003, 0.0]).collect();
+    let goal: Vec<Vec3> = (0..CVS).map(|k| [STEP * k as f32, -0.001 * k as f32 - 0.003, 0.0]).collect();
+    let (points, found) = kept(&mesh, &[0, CVS], &rest, &goal, &Clearance::default());
+    // All of the hair is below the floor, and crosses nothing.
+    assert_eq!((points, found), (goal, KeptOut::default()));
+    let goal: Vec<Vec3> = (0..CVS).map(|k| [STEP * k as f32, 0.001 * k as f32 - 0.003, 0.0]).collect();
+    let (points, found) = kept(&mesh, &[0, CVS], &rest, &goal, &Clearance::default());
+    assert!((points[0][1] - 1e-4).abs() < 1e-6 && points[0][0] == 0.0, "{points:?}");
+    assert!(points[1..].iter().all(|cv| cv[1] > 0.0 && cv[1] < 6e-3), "{points:?}");
+    assert_eq!((found.kept_out, found.started_inside, found.crossings_left), (1, 0, 0));
+    assert!(found.length_error < 1e-5);
 }
 
 /// On a skin that moved, rest shapes are those that moved with it.
@@ -152,7 +170,7 @@ fn poses_carry_rest_shapes() {
         let kept = keep_out(&starts, &mut points, &how);
         assert_eq!(kept.kept_out, expected.1.kept_out);
         let off = points.iter().zip(&expected.0).map(|(a, b)| (to_f64(*a) - shift - to_f64(*b)).amax());
-        // Rounding may decide whether the last half is free: 0.08 m × 0.5 rad ÷ 64.
-        assert!(off.fold(0.0, f64::max) < 8e-4);
+        // Rounding may decide whether the last half is free: 0.08 m × 0.5 rad ÷ 16.
+        assert!(off.fold(0.0, f64::max) < 3e-3);
     }
 }
