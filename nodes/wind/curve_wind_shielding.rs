@@ -54,6 +54,9 @@ params! { PARAMS:
     GROUP: Param<Name> = group::param();
 }
 
+/// Share of the wind that a CV lost to shelter.
+const SHELTER: Attr<f32> = Attr::point("shelter");
+
 const OUT: Output = Output::like("curves", &CURVES, "The curves, with less wind where they are sheltered.");
 
 metrics! { METRICS:
@@ -63,7 +66,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Shielding",
-    1,
+    2,
     "Reduces the wind for curves in the lee of a collider. Each CV looks upwind; the fraction of a curve's CVs that \
      see a collider is written to `shielded` and scales the curve's `envelope` down. Place this node before \
      Curve_Wind, on curves that are not yet bent.",
@@ -73,7 +76,7 @@ pub(crate) static NODE: Node = Node::new(
 .params(PARAMS)
 .outputs(&[&OUT])
 .reads(&[&P, &ENVELOPE])
-.writes(&[&ENVELOPE, &SHIELDED])
+.writes(&[&ENVELOPE, &SHIELDED, &SHELTER])
 .attributes(|params| group::attributes(params, GROUP))
 .metrics(METRICS)
 .neutral(|params, wires| match params {
@@ -81,7 +84,7 @@ pub(crate) static NODE: Node = Node::new(
     _ if params.get(OFFSET) == 0.0 => Some("`offset` is 0"),
     _ => None,
 })
-.neutral_fills(&[Fill::missing(ENVELOPE, 1.0), Fill::always(SHIELDED, 0.0)])
+.neutral_fills(&[Fill::missing(ENVELOPE, 1.0), Fill::always(SHIELDED, 0.0), Fill::always(SHELTER, 0.0)])
 .leaves_out(|params, _| {
     let stages =
         [(params.get(SHIELD).value, "envelope", "`shield` is 0"), (params.get(SMOOTH), "cones", "`smooth` is 0")];
@@ -105,11 +108,17 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 
     cx.publish(SHELTERED, shielded.iter().filter(|share| **share > 0.0).count() as f64);
     cx.publish(RAYS, cast as f64);
-    if amount > 0.0 || curves.get(ENVELOPE).is_none() {
+    let lost = {
         let shield = cx.mask(SHIELD, &curves)?;
         let factors = group.map(|group| group.factors(shield));
-        let envelope = scaled(&curves, &shielded, group::masked(shield, factors.as_deref()));
+        shelter(&curves, &shielded, group::masked(shield, factors.as_deref()))
+    };
+    if amount > 0.0 || curves.get(ENVELOPE).is_none() {
+        let envelope = scaled(&curves, &lost);
         curves.set(ENVELOPE, envelope)?;
+    }
+    if cx.wants(SHELTER) {
+        curves.set(SHELTER, lost)?;
     }
     if cx.wants(SHIELDED) {
         curves.set(SHIELDED, shielded)?;
@@ -164,14 +173,16 @@ impl<'m> Wall<'m> {
     }
 }
 
-/// The envelope, 1 if missing, less each curve's shelter.
-fn scaled(curves: &Component, shielded: &[f32], amount: Masked<'_, f32>) -> Vec<f32> {
+/// The share of the wind that each CV loses, 0…1.
+fn shelter(curves: &Component, shielded: &[f32], amount: Masked<'_, f32>) -> Vec<f32> {
+    let cvs = curves.runs().ranges().zip(shielded);
+    cvs.flat_map(|(cvs, share)| cvs.map(move |cv| (share * amount.at(cv)).clamp(0.0, 1.0))).collect()
+}
+
+/// The envelope, 1 if missing, less the share that each CV loses.
+fn scaled(curves: &Component, lost: &[f32]) -> Vec<f32> {
     let mut envelope = curves.get(ENVELOPE).map_or_else(|| vec![1.0; curves.point_count()], <[f32]>::to_vec);
-    for (cvs, share) in curves.runs().ranges().zip(shielded) {
-        for cv in cvs {
-            envelope[cv] *= 1.0 - (share * amount.at(cv)).clamp(0.0, 1.0);
-        }
-    }
+    envelope.iter_mut().zip(lost).for_each(|(envelope, lost)| *envelope *= 1.0 - lost);
     envelope
 }
 
@@ -213,6 +224,18 @@ mod tests {
             assert_eq!(out.curves().get(ENVELOPE), Some(&[0.75, 0.75, 0.75, 0.75, 1.0, 1.0][..]));
             assert_eq!((out.metrics["sheltered_curves"], out.metrics["rays"]), (1.0, 6.0));
         }
+    }
+
+    #[test]
+    fn shelter_is_the_share_of_the_wind_that_is_lost() {
+        let mut some = curves(1.0);
+        some.part_mut(Kind::Curves).unwrap().set(Attr::<i32>::element("some"), vec![1, 0]).unwrap();
+        let shelter = |bench: Bench| bench.cook().curves().get(SHELTER).unwrap().to_vec();
+        assert_eq!(shelter(behind_a_wall().set(SHIELD, 0.5.into())), [0.25, 0.25, 0.25, 0.25, 0.0, 0.0]);
+        assert_eq!(shelter(behind_a_wall().set(SHIELD, 5.0.into())), [1.0, 1.0, 1.0, 1.0, 0.0, 0.0]);
+        assert_eq!(shelter(behind_a_wall().set(OFFSET, 0.0)), [0.0; 6]);
+        let grouped = bench(&NODE).input(CURVES, some).input(COLLIDERS, wall(1.0)).set(GROUP, "some".into());
+        assert_eq!(shelter(grouped), [0.5, 0.5, 0.5, 0.5, 0.0, 0.0]);
     }
 
     #[test]

@@ -393,3 +393,39 @@ fn outside_a_group_the_envelope_keeps_its_bits() {
     let error = single(curves).set(GROUP, "tipz".into()).at(20.0).try_cook().unwrap_err();
     assert_eq!(error.to_string(), "`group` is `tipz`, which the curves do not have; did you mean `tips`?");
 }
+
+#[test]
+fn strength_multiplies_each_influence() {
+    let gust = single(dot(5.0)).set(DISTANCE, 3.0).set(FALLOFF, ramp(&[[0.0, 0.25]])).set(BASE, 0.125);
+    let at = |bench: Bench| envelope(&bench.at(48.0).cook())[0];
+    for (strength, expected) in [(0.0, 0.125), (0.5, 0.25), (1.0, 0.375), (2.0, 0.625), (9.0, 1.0)] {
+        assert_eq!(at(gust.clone().set(STRENGTH, strength)), expected, "{strength}");
+    }
+    // A control of strength ½ about the CV, full at its centre: 0.125 + 2 · 0.5 · 0.25.
+    let by_hand = |strength: f32| {
+        let outline = outline(ControlShape::Sphere, 1.0, 1).into_iter().map(|[x, y, z]| [x + 5.0, y, z]).collect();
+        let keys = Ramp::constant(0.25);
+        let points = gust_control::component(outline, ControlShape::Sphere, 1.0, 0.5, &keys).unwrap();
+        at(gust.clone().set(NUM_GUSTS, 0).input(CONTROLS, Geometry::from(points)).set(STRENGTH, strength))
+    };
+    assert_eq!([by_hand(0.0), by_hand(1.0), by_hand(2.0)], [0.125, 0.25, 0.375]);
+}
+
+#[test]
+fn gust_is_what_scales_the_envelope_which_never_exceeds_1() {
+    let curves = dot(5.0);
+    let felt = |incoming: Option<f32>| {
+        let mut curves = curves.clone();
+        if let Some(incoming) = incoming {
+            curves.part_mut(Kind::Curves).unwrap().set(ENVELOPE, vec![incoming]).unwrap();
+        }
+        let out = single(curves).set(DISTANCE, 3.0).set(FALLOFF, ramp(&[[0.0, 0.5]])).at(48.0).cook();
+        (out.curves().get(GUST).unwrap()[0], envelope(&out)[0])
+    };
+    assert_eq!(felt(None), (0.5, 0.5));
+    assert_eq!(felt(Some(0.5)), (0.5, 0.25));
+    assert_eq!(felt(Some(8.0)), (0.5, 1.0));
+    assert_eq!(felt(Some(-1.0)), (0.5, 0.0));
+    let calm = bench(&NODE).input(CURVES, dot(5.0)).set(BASE, 1.0).cook();
+    assert_eq!(calm.curves().get(GUST), Some(&[1.0][..]));
+}
