@@ -5,6 +5,7 @@ mod curve_attach;
 mod curve_deform;
 mod curve_in;
 mod curve_interpolate;
+mod curve_resample;
 mod curve_scatter;
 mod lattice_deform;
 mod merge;
@@ -24,6 +25,7 @@ pub static NODES: &[&Node] = &[
     &curve_deform::NODE,
     &curve_in::NODE,
     &curve_interpolate::NODE,
+    &curve_resample::NODE,
     &curve_scatter::NODE,
     &lattice_deform::NODE,
     &merge::NODE,
