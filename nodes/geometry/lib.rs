@@ -2,8 +2,10 @@
 
 mod attribute_expr;
 mod curve_attach;
+mod curve_deform;
 mod curve_in;
 mod curve_interpolate;
+mod curve_resample;
 mod curve_scatter;
 mod lattice_deform;
 mod merge;
@@ -20,8 +22,10 @@ use engine::node::Node;
 pub static NODES: &[&Node] = &[
     &attribute_expr::NODE,
     &curve_attach::NODE,
+    &curve_deform::NODE,
     &curve_in::NODE,
     &curve_interpolate::NODE,
+    &curve_resample::NODE,
     &curve_scatter::NODE,
     &lattice_deform::NODE,
     &merge::NODE,

@@ -15,6 +15,7 @@
 //!   Where the skin collapses to a line or a point it carries curves without rotating them.
 //! * While `blend` is 0, or `ramp` is nowhere above 0, nothing swings: when they rise, curves start from rest.
 
+use crate::shared::group::{self, Group};
 use curves::attach::{RootPositions, SkinBinding};
 use curves::jiggle::{Drag, Jiggle, MASK_RANGE, RigidStep, Spring, steps_to_forget, with_lengths_between};
 use engine::prelude::*;
@@ -65,6 +66,7 @@ params! { PARAMS:
     BLEND: Param<Maskable> = Param::maskable("blend", 1.0,
         "How much of the swing is applied: 0 gives the incoming curves, 1 the whole swing. Lengths are kept at any \
          value. While it is 0 nothing swings; when it rises from 0, curves start from rest.").within(0.0, 1.0);
+    GROUP: Param<Name> = group::param();
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The swinging curves. Lengths and roots are those of `curves`.");
@@ -89,6 +91,7 @@ pub(crate) static NODE: Node = Node::new(
 .outputs(&[&OUT])
 .reads(&[&P])
 .writes(&[&P])
+.attributes(|params| group::attributes(params, GROUP))
 .metrics(METRICS)
 .neutral(|params, _| stands_still(params))
 .leaves_out(|params, wires| match params {
@@ -163,11 +166,12 @@ impl Chain for Swing {
     fn output(&self, cx: &FrameCx) -> Result<Outputs> {
         let mut curves = cx.edit(CURVES);
         let blend = cx.mask(BLEND, cx.part(CURVES))?;
+        let factors = Group::of(&cx.get(GROUP), cx.part(CURVES))?.map(|group| group.factors(blend));
         let clock = Clock { fps: cx.fps(), seed: 0 };
         cx.publish(WINDOW_FRAMES, f64::from(past(cx.params(), clock).frames));
         let mut farthest = 0.0;
         if let Some(springs) = &self.springs {
-            let shaped = springs.shape(blend);
+            let shaped = springs.shape(group::masked(blend, factors.as_deref()));
             farthest = shaped.max_offset;
             curves.set(P, shaped.points)?;
         }

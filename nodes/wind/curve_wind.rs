@@ -12,6 +12,7 @@
 //! * `blend` scales each segment's turn instead of mixing positions, so that a partial wind keeps lengths too.
 
 use crate::shared::direction::unit_direction;
+use crate::shared::group::{self, Group};
 use curves::wind_bend::{Bend, BendMode, BendNoise, bend};
 use engine::prelude::*;
 use numerics::noise::{Field, NoiseKind};
@@ -95,6 +96,7 @@ params! { PARAMS:
         "How much of each segment's turn is applied: 0 leaves the curves alone, 1 applies the whole wind. Lengths are \
          kept at any value.").within(0.0, 1.0);
     SEED: Param<Seed> = Param::seed("Each seed gives another noise pattern.").when(has_noise);
+    GROUP: Param<Name> = group::param();
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The bent curves. Lengths and roots are unchanged.");
@@ -117,6 +119,7 @@ pub(crate) static NODE: Node = Node::new(
 .outputs(&[&OUT])
 .reads(&[&P, &ENVELOPE, &PREF])
 .writes(&[&P])
+.attributes(|params| group::attributes(params, GROUP))
 .metrics(METRICS)
 .neutral(|params, _| match params {
     _ if params.get(GLOBAL_ROTATE).value == 0.0 => Some("`global_rotate` is 0"),
@@ -146,12 +149,14 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
             roots: roots.as_deref(),
         })
     };
+    let rotate = cx.mask(GLOBAL_ROTATE, &curves)?;
+    let factors = Group::of(&cx.get(GROUP), &curves)?.map(|group| group.factors(rotate));
     let bent = bend(
         curves.runs().starts(),
         curves.positions(),
         &Bend {
             wind: direction(cx.params()).map(|x| x as f32),
-            rotate: cx.mask(GLOBAL_ROTATE, &curves)?,
+            rotate: group::masked(rotate, factors.as_deref()),
             envelope: curves.get(ENVELOPE),
             ramp: &cx.get(RAMP_ROTATE),
             mode: match cx.get(MODE) {
@@ -330,6 +335,28 @@ mod tests {
         assert_eq!(ones, with(&|curves| curves.set(Attr::point("soft"), whole(20)).unwrap()));
         assert_eq!(ones, with(&|curves| curves.set(Attr::element("soft"), whole(4)).unwrap()));
         assert_ne!(ones, floats);
+    }
+
+    /// Curves of the group bend as without one; the others keep their bits, and so does the part of a curve before its first
+    /// CV in the group.
+    #[test]
+    fn outside_a_group_curves_keep_their_bits() {
+        let mut curves = field(3);
+        let part = curves.part_mut(Kind::Curves).unwrap();
+        part.set(Attr::<i32>::element("third"), (0..9).map(|curve| curve % 3).collect()).unwrap();
+        part.set(Attr::<f32>::point("tips"), (0..45).map(|cv| if cv % 5 >= 2 { 0.5 } else { 0.0 }).collect()).unwrap();
+        let windy = |name: &str| bench(&NODE).input(CURVES, curves.clone()).set(GROUP, name.into()).cook();
+        let at = |out: &BenchResult, cv: usize| out.curves().positions()[cv].map(f32::to_bits);
+        let (still, all, third) = (curves.curves().unwrap().positions(), windy(""), windy("third"));
+        for (cv, still) in still.iter().enumerate() {
+            let expected = if cv / 5 % 3 == 0 { still.map(f32::to_bits) } else { at(&all, cv) };
+            assert_eq!(at(&third, cv), expected, "CV {cv}");
+        }
+        let tips = windy("tips");
+        for (cv, still) in still.iter().enumerate() {
+            assert_eq!(at(&tips, cv) == still.map(f32::to_bits), cv % 5 <= 2, "CV {cv}");
+        }
+        assert!(tips.metrics["length_error"] < 1e-6);
     }
 
     /// Where the mask is 0 the wind blows straight, where it is 1 as without a mask.

@@ -19,10 +19,11 @@
 
 use std::sync::Arc;
 
-use curves::collide::{Collide, ContactMethod, at_rest, collide};
+use curves::collide::{Collide, Collided, ContactMethod, at_rest, collide};
 use engine::prelude::*;
 use numerics::tree::TriangleTree;
 
+use crate::shared::group::{self, Group, taken};
 use crate::shared::surface::{Surface, tree};
 
 choice! {
@@ -78,6 +79,7 @@ params! { PARAMS:
     BLEND: Param<Maskable> = Param::maskable("blend", 1.0,
         "How much of each segment's collision response is applied: 0 leaves the curves as the wind bends them, 1 keeps \
          them out of the colliders. Lengths are kept at any value.").within(0.0, 1.0);
+    GROUP: Param<Name> = group::param();
 }
 
 /// Number of a curve's segments that cross a collider.
@@ -131,6 +133,7 @@ pub(crate) static NODE: Node = Node::new(
 .outputs(&[&OUT])
 .reads(&[&P])
 .writes(&[&P, &UNFREED_SEGMENTS])
+.attributes(|params| group::attributes(params, GROUP))
 .metrics(METRICS)
 .neutral(|params, wires| match params {
     _ if wires.count(&COLLIDERS) + wires.count(&SKIN) == 0 => Some("neither `colliders` nor `skin` is wired"),
@@ -162,10 +165,42 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         ))
         .hint("give `rest` the curves as they were before the wind nodes"));
     }
+    let (points, crossings) = match Group::of(&cx.get(GROUP), &curves)? {
+        None => {
+            let collided = collided(cx, &curves, rest)?;
+            (collided.points, collided.crossings)
+        }
+        Some(group) => collided_of(cx, &group, &curves, rest)?,
+    };
+    curves.set(P, points)?;
+    if cx.wants(UNFREED_SEGMENTS) {
+        curves.set(UNFREED_SEGMENTS, crossings)?;
+    }
+    Ok(OUT.with(curves))
+}
+
+/// The curves of a group collided, the others as they are: points, and crossing segments of each curve.
+fn collided_of(cx: &Cx, group: &Group, curves: &Component, rest: &Component) -> Result<(Vec<[f32; 3]>, Vec<i32>)> {
+    let chosen = group.curves(curves.runs());
+    let part = taken(curves, &chosen)?;
+    let part_of_rest = rest.kept(chosen.clone(), || taken(rest, &chosen))?;
+    let collided = collided(cx, &part, &part_of_rest)?;
+    let (mut points, mut crossings) = (curves.positions().to_vec(), vec![0; curves.element_count()]);
+    for (curve, own) in chosen.iter().zip(part.runs().ranges()) {
+        points[curves.runs().range(*curve as usize)].copy_from_slice(&collided.points[own]);
+    }
+    chosen.iter().zip(collided.crossings).for_each(|(curve, count)| crossings[*curve as usize] = count);
+    Ok((points, crossings))
+}
+
+/// Curves collided, and the metrics published.
+fn collided(cx: &Cx, curves: &Component, rest: &Component) -> Result<Collided> {
     let colliders = cx.part(COLLIDERS);
     let trees: Vec<Arc<TriangleTree>> = colliders.iter().map(|mesh| tree(mesh)).collect();
     let obstacles: Vec<&TriangleTree> = trees.iter().map(Arc::as_ref).collect();
     let skin = cx.part(SKIN).or(colliders.first().copied()).map(Surface::of);
+    let blend = cx.mask(BLEND, curves)?;
+    let factors = Group::of(&cx.get(GROUP), curves)?.map(|group| group.factors(blend));
     let mut how = Collide {
         obstacles: &obstacles,
         skin: skin.as_ref().map(Surface::skin),
@@ -179,8 +214,8 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         offset_scale: Some(cx.get(OFFSET_SCALE)).filter(|scale| *scale >= 0.0),
         loft: cx.get(LOFT),
         at_rest: None,
-        blend: cx.mask(BLEND, &curves)?,
-        width: cx.mask(WIDTH, &curves)?,
+        blend: group::masked(blend, factors.as_deref()),
+        width: cx.mask(WIDTH, curves)?,
     };
     let starts = curves.runs().starts();
     // Computed once for still colliders and curves.
@@ -197,11 +232,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     cx.publish(CONTACTS, collided.contacts as f64);
     cx.publish(DEEPEST, collided.deepest_overlap);
     cx.publish(LENGTH_ERROR, collided.length_error);
-    curves.set(P, collided.points)?;
-    if cx.wants(UNFREED_SEGMENTS) {
-        curves.set(UNFREED_SEGMENTS, collided.crossings)?;
-    }
-    Ok(OUT.with(curves))
+    Ok(collided)
 }
 
 /// Everything that the test of rest curves depends on besides the curves; equal if the trees are the same objects.

@@ -1,8 +1,8 @@
 //! Curve_Wind_Gusts: gusts that pass over curves scale the wind.
 //!
 //! W5. A gust is a sphere that travels with the wind from a plane perpendicular to it; its influence is 1 at its centre
-//! and 0 at its boundary. Or it is a Gust_Control, placed by hand. `envelope` = incoming × clamp(`base` + Σ influences,
-//! 0, 1).
+//! and 0 at its boundary. Or it is a Gust_Control, placed by hand. `gust` = clamp(`base` + Σ `strength` · influence, 0, 1),
+//! `envelope` = clamp(incoming · `gust`, 0, 1).
 //!
 //! What W leaves open:
 //! * A gust is a pure function of seed, index and repetition, so any frame can be cooked alone. Its path is ∫ speed ·
@@ -15,8 +15,9 @@
 //! * A gust fades over its decay while it travels on.
 
 use crate::shared::direction::unit_direction;
+use crate::shared::group::{self, Group};
 use crate::shared::gust_control;
-use curves::gusts::{Control, Draw, Gust, Gusts, Plane, Sphere, evaluate};
+use curves::gusts::{Control, Draw, Gust, Gusts, Influence, Plane, Sphere, evaluate, scale};
 use engine::prelude::*;
 use numerics::ramp::Ramp;
 use numerics::vector::DVec3;
@@ -71,10 +72,22 @@ params! { PARAMS:
         "Strength of the wind outside gusts: at 0 it is calm between gusts; at 1 the full wind blows everywhere and \
          gusts add nothing.")
         .within(0.0, 1.0);
+    STRENGTH: Param<f32> = Param::float("strength", 1.0,
+        "Multiplies what each gust adds, those placed by hand included: at 0 there are none, above 1 their full strength \
+         reaches farther towards their boundaries. The wind never exceeds its full strength.")
+        .at_least(0.0).soft(0.0, 4.0);
     SEED: Param<Seed> = Param::seed("Each seed gives other gusts.").when(is_asked);
+    GROUP: Param<Name> = group::param();
 }
 
-const OUT: Output = Output::like("curves", &CURVES, "The curves, with their `envelope` scaled by the gusts.");
+/// Strength of the wind at a CV by gusts alone.
+const GUST: Attr<f32> = Attr::point("gust");
+
+const OUT: Output = Output::like(
+    "curves",
+    &CURVES,
+    "The curves, with their `envelope` scaled by the gusts, and `gust`, by which it was scaled.",
+);
 
 metrics! { METRICS:
     ACTIVE_GUSTS = Metric::new("active_gusts", Unit::None,
@@ -89,7 +102,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Gusts",
-    1,
+    2,
     "Sends gusts over the curves: writes their `envelope`, by which Curve_Wind scales the wind, so that it blows where \
      a gust passes. Gusts are spheres that travel with the wind, each with its own random size, speed and start, or \
      regions placed by hand with Gust_Control.",
@@ -107,13 +120,14 @@ pub(crate) static NODE: Node = Node::new(
     &gust_control::STRENGTH,
     &gust_control::RAMP,
 ])
-.writes(&[&ENVELOPE])
+.writes(&[&ENVELOPE, &GUST])
+.attributes(|params| group::attributes(params, GROUP))
 .metrics(METRICS)
 .neutral(|params, wires| {
     let full = params.get(BASE) == 1.0 && params.get(FALLOFF).min() >= 0.0;
     (full && wires.count(&CONTROLS) == 0).then_some("`base` is 1")
 })
-.neutral_fills(&[Fill::missing(ENVELOPE, 1.0)])
+.neutral_fills(&[Fill::missing(ENVELOPE, 1.0), Fill::always(GUST, 1.0)])
 .leaves_out(leaves_out)
 .integrates(direction)
 .integrates(|params| along(params, params.get(SPEED_RANGE).low))
@@ -127,25 +141,63 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
     let (spheres, dropped) = if full || !sends(cx.params()) { (Vec::new(), 0) } else { sent(cx) };
     cx.publish(ACTIVE_GUSTS, spheres.len() as f64);
     cx.publish(DROPPED_GUSTS, dropped as f64);
+    let group = Group::of(&cx.get(GROUP), &curves)?;
     let incoming = curves.get(ENVELOPE);
-    let (envelope, reached) = if full {
-        (incoming.is_none().then(|| vec![1.0; curves.point_count()]), 0)
+    let wanted = cx.wants(GUST);
+    let (envelope, gust, reached) = if full {
+        let ones = || vec![1.0; curves.point_count()];
+        (incoming.is_none().then(ones), wanted.then(ones), 0)
     } else {
-        let gusts = Gusts { base, falloff: &falloff, spheres: &spheres, controls: &controls, incoming };
-        let felt = evaluate(curves.positions(), &gusts);
-        (Some(felt.values), felt.reached)
+        let gusts = Gusts { base, falloff: &falloff, spheres: &spheres, controls: &controls, incoming: None };
+        let Influence { values, reached } = match &group {
+            // Gusts alone, where anyone takes them, otherwise what comes in is scaled at once.
+            None => evaluate(curves.positions(), &Gusts { incoming: incoming.filter(|_| !wanted), ..gusts }),
+            Some(group) => {
+                let points: Vec<[f32; 3]> = group.cvs().map(|cv| curves.positions()[cv]).collect();
+                evaluate(&points, &gusts)
+            }
+        };
+        match group {
+            None => {
+                let mut envelope = values.clone();
+                if let Some(incoming) = incoming.filter(|_| wanted) {
+                    scale(&mut envelope, incoming);
+                }
+                (Some(envelope), wanted.then_some(values), reached)
+            }
+            Some(group) => {
+                let (envelope, gust) = on_group(&group, &curves, values);
+                (Some(envelope), Some(gust), reached)
+            }
+        }
     };
     cx.publish(REACHED_POINTS, reached as f64);
     if let Some(envelope) = envelope {
         curves.set(ENVELOPE, envelope)?;
     }
+    if let Some(gust) = gust.filter(|_| wanted) {
+        curves.set(GUST, gust)?;
+    }
     Ok(OUT.with(curves))
+}
+
+/// `envelope` and `gust` where only the CVs of a group feel gusts, of these strengths. Others keep what they have, or have 1.
+fn on_group(group: &Group, curves: &Component, felt: Vec<f32>) -> (Vec<f32>, Vec<f32>) {
+    let before = |of: Attr<f32>| curves.get(of).map_or_else(|| vec![1.0; curves.point_count()], <[f32]>::to_vec);
+    let (mut envelope, mut gust) = (before(ENVELOPE), before(GUST));
+    let mut scaled = felt.clone();
+    scale(&mut scaled, &group.cvs().map(|cv| envelope[cv]).collect::<Vec<f32>>());
+    for ((cv, felt), scaled) in group.cvs().zip(felt).zip(scaled) {
+        (envelope[cv], gust[cv]) = (scaled, felt);
+    }
+    (envelope, gust)
 }
 
 fn controls(cx: &FrameCx) -> Result<Vec<Control>> {
     let mut controls = Vec::new();
     for (wire, points) in cx.part(CONTROLS).into_iter().enumerate() {
-        controls.extend(gust_control::controls(points, wire)?);
+        let found = gust_control::controls(points, wire)?;
+        controls.extend(found.into_iter().map(|control| control.times(cx.get(STRENGTH))));
     }
     Ok(controls)
 }
@@ -173,6 +225,7 @@ fn sent(cx: &FrameCx) -> (Vec<Sphere>, u64) {
     let distance = if distance > 0.0 { distance } else { f64::from(cx.get(RADIUS_RANGE).high) };
     let area = cx.get(AREA).map(f64::from);
     let [_, slow, fast] = cx.integrals(cx.frame()).map(DVec3::from);
+    let strength = cx.get(STRENGTH);
     // Gusts that start within the same frame are launched by the same wind.
     let mut known = BTreeMap::new();
     let sphere = |gust: &Gust| {
@@ -185,7 +238,7 @@ fn sent(cx: &FrameCx) -> (Vec<Sphere>, u64) {
         Sphere {
             centre: (from + launch.travelled([slow, fast], gust)).into(),
             radius: gust.radius,
-            strength: gust.strength,
+            strength: gust.strength * strength,
             noise: gust.noise,
             salt: gust.salt,
         }

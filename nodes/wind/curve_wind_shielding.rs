@@ -22,6 +22,7 @@ use engine::prelude::*;
 use numerics::masked::Masked;
 use numerics::tree::TriangleTree;
 
+use crate::shared::group::{self, Group, taken};
 use crate::shared::surface::tree;
 
 inputs! { INPUTS:
@@ -50,7 +51,11 @@ params! { PARAMS:
         "A face whose plane is this close to a CV does not shelter it, because the CV lies on that face. 0 only allows \
          for rounding; if roots lie deeper in the skin, set this to their depth.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.1);
+    GROUP: Param<Name> = group::param();
 }
+
+/// Share of the wind that a CV lost to shelter.
+const SHELTER: Attr<f32> = Attr::point("shelter");
 
 const OUT: Output = Output::like("curves", &CURVES, "The curves, with less wind where they are sheltered.");
 
@@ -61,7 +66,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Shielding",
-    1,
+    2,
     "Reduces the wind for curves in the lee of a collider. Each CV looks upwind; the fraction of a curve's CVs that \
      see a collider is written to `shielded` and scales the curve's `envelope` down. Place this node before \
      Curve_Wind, on curves that are not yet bent.",
@@ -71,14 +76,15 @@ pub(crate) static NODE: Node = Node::new(
 .params(PARAMS)
 .outputs(&[&OUT])
 .reads(&[&P, &ENVELOPE])
-.writes(&[&ENVELOPE, &SHIELDED])
+.writes(&[&ENVELOPE, &SHIELDED, &SHELTER])
+.attributes(|params| group::attributes(params, GROUP))
 .metrics(METRICS)
 .neutral(|params, wires| match params {
     _ if wires.count(&COLLIDERS) == 0 => Some("no collider is wired"),
     _ if params.get(OFFSET) == 0.0 => Some("`offset` is 0"),
     _ => None,
 })
-.neutral_fills(&[Fill::missing(ENVELOPE, 1.0), Fill::always(SHIELDED, 0.0)])
+.neutral_fills(&[Fill::missing(ENVELOPE, 1.0), Fill::always(SHIELDED, 0.0), Fill::always(SHELTER, 0.0)])
 .leaves_out(|params, _| {
     let stages =
         [(params.get(SHIELD).value, "envelope", "`shield` is 0"), (params.get(SMOOTH), "cones", "`smooth` is 0")];
@@ -93,13 +99,26 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let mut curves = cx.edit(CURVES);
     let amount = cx.get(SHIELD).value;
     let looks = amount > 0.0 || cx.wants(SHIELDED);
-    let shielded = if looks { sheltered(cx, &curves) } else { vec![0.0; curves.element_count()] };
+    let group = Group::of(&cx.get(GROUP), &curves)?;
+    let (shielded, cast) = match &group {
+        _ if !looks => (vec![0.0; curves.element_count()], 0),
+        None => (sheltered(cx, &curves), curves.point_count()),
+        Some(group) => sheltered_of(cx, group, &curves)?,
+    };
 
     cx.publish(SHELTERED, shielded.iter().filter(|share| **share > 0.0).count() as f64);
-    cx.publish(RAYS, if looks { curves.point_count() as f64 } else { 0.0 });
+    cx.publish(RAYS, cast as f64);
+    let lost = {
+        let shield = cx.mask(SHIELD, &curves)?;
+        let factors = group.map(|group| group.factors(shield));
+        shelter(&curves, &shielded, group::masked(shield, factors.as_deref()))
+    };
     if amount > 0.0 || curves.get(ENVELOPE).is_none() {
-        let envelope = scaled(&curves, &shielded, cx.mask(SHIELD, &curves)?);
+        let envelope = scaled(&curves, &lost);
         curves.set(ENVELOPE, envelope)?;
+    }
+    if cx.wants(SHELTER) {
+        curves.set(SHELTER, lost)?;
     }
     if cx.wants(SHIELDED) {
         curves.set(SHIELDED, shielded)?;
@@ -119,6 +138,17 @@ fn sheltered(cx: &Cx, curves: &Component) -> Vec<f32> {
         skin_gap: cx.get(SKIN_GAP),
     };
     shield(curves.runs().starts(), curves.positions(), &colliders, &how)
+}
+
+/// The same where only the curves of a group are looked at, and the number of CVs that look.
+fn sheltered_of(cx: &Cx, group: &Group, curves: &Component) -> Result<(Vec<f32>, usize)> {
+    let chosen = group.curves(curves.runs());
+    let part = taken(curves, &chosen)?;
+    let mut shielded = vec![0.0; curves.element_count()];
+    for (curve, share) in chosen.into_iter().zip(sheltered(cx, &part)) {
+        shielded[curve as usize] = share;
+    }
+    Ok((shielded, part.point_count()))
 }
 
 /// A collider, and what is computed once while it does not move.
@@ -143,14 +173,16 @@ impl<'m> Wall<'m> {
     }
 }
 
-/// The envelope, 1 if missing, less each curve's shelter.
-fn scaled(curves: &Component, shielded: &[f32], amount: Masked<'_, f32>) -> Vec<f32> {
+/// The share of the wind that each CV loses, 0…1.
+fn shelter(curves: &Component, shielded: &[f32], amount: Masked<'_, f32>) -> Vec<f32> {
+    let cvs = curves.runs().ranges().zip(shielded);
+    cvs.flat_map(|(cvs, share)| cvs.map(move |cv| (share * amount.at(cv)).clamp(0.0, 1.0))).collect()
+}
+
+/// The envelope, 1 if missing, less the share that each CV loses.
+fn scaled(curves: &Component, lost: &[f32]) -> Vec<f32> {
     let mut envelope = curves.get(ENVELOPE).map_or_else(|| vec![1.0; curves.point_count()], <[f32]>::to_vec);
-    for (cvs, share) in curves.runs().ranges().zip(shielded) {
-        for cv in cvs {
-            envelope[cv] *= 1.0 - (share * amount.at(cv)).clamp(0.0, 1.0);
-        }
-    }
+    envelope.iter_mut().zip(lost).for_each(|(envelope, lost)| *envelope *= 1.0 - lost);
     envelope
 }
 
@@ -195,11 +227,48 @@ mod tests {
     }
 
     #[test]
+    fn shelter_is_the_share_of_the_wind_that_is_lost() {
+        let mut some = curves(1.0);
+        some.part_mut(Kind::Curves).unwrap().set(Attr::<i32>::element("some"), vec![1, 0]).unwrap();
+        let shelter = |bench: Bench| bench.cook().curves().get(SHELTER).unwrap().to_vec();
+        assert_eq!(shelter(behind_a_wall().set(SHIELD, 0.5.into())), [0.25, 0.25, 0.25, 0.25, 0.0, 0.0]);
+        assert_eq!(shelter(behind_a_wall().set(SHIELD, 5.0.into())), [1.0, 1.0, 1.0, 1.0, 0.0, 0.0]);
+        assert_eq!(shelter(behind_a_wall().set(OFFSET, 0.0)), [0.0; 6]);
+        let grouped = bench(&NODE).input(CURVES, some).input(COLLIDERS, wall(1.0)).set(GROUP, "some".into());
+        assert_eq!(shelter(grouped), [0.5, 0.5, 0.5, 0.5, 0.0, 0.0]);
+    }
+
+    #[test]
     fn an_incoming_envelope_is_scaled() {
         let mut gusts = curves(1.0);
         gusts.part_mut(Kind::Curves).unwrap().set(ENVELOPE, vec![0.5, 0.25, 2.0, 0.0, 0.5, 0.5]).unwrap();
         let out = bench(&NODE).input(CURVES, gusts).input(COLLIDERS, wall(1.0)).cook();
         assert_eq!(out.curves().get(ENVELOPE), Some(&[0.25, 0.125, 1.0, 0.0, 0.5, 0.5][..]));
+    }
+
+    #[test]
+    fn outside_a_group_nothing_is_sheltered() {
+        let with = |name: &str, rows: [i32; 2], tips: [f32; 6]| {
+            let mut curves = curves(1.0);
+            let part = curves.part_mut(Kind::Curves).unwrap();
+            part.set(ENVELOPE, vec![0.5, 0.25, 2.0, -0.0, 0.5, 0.5]).unwrap();
+            part.set(Attr::<i32>::element("some"), rows.to_vec()).unwrap();
+            part.set(Attr::<f32>::point("tips"), tips.to_vec()).unwrap();
+            bench(&NODE).input(CURVES, curves).input(COLLIDERS, wall(1.0)).set(GROUP, name.into()).cook()
+        };
+        let tips = [0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+        let out = with("some", [0, 1], tips);
+        assert_eq!(out.curves().get(SHIELDED), Some(&[0.0, 0.0][..]));
+        let same = |a: &[f32], b: [f32; 6]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
+        assert!(same(out.curves().get(ENVELOPE).unwrap(), [0.5, 0.25, 2.0, -0.0, 0.5, 0.5]));
+        assert_eq!((out.metrics["sheltered_curves"], out.metrics["rays"]), (0.0, 2.0));
+        let out = with("some", [7, 0], tips);
+        assert_eq!(out.curves().get(SHIELDED), Some(&[0.5, 0.0][..]));
+        assert_eq!(out.curves().get(ENVELOPE), Some(&[0.25, 0.125, 1.0, 0.0, 0.5, 0.5][..]));
+        // Of a curve with one CV in the group, half of whose CVs see the wall, that CV alone loses wind.
+        let out = with("tips", [0, 0], tips);
+        assert_eq!(out.curves().get(SHIELDED), Some(&[0.5, 0.0][..]));
+        assert!(same(out.curves().get(ENVELOPE).unwrap(), [0.5, 0.25, 1.0, -0.0, 0.5, 0.5]));
     }
 
     #[test]

@@ -8,6 +8,7 @@
 
 pub mod attach;
 pub mod collide;
+pub mod deform;
 pub mod guides;
 pub mod gusts;
 pub mod jiggle;

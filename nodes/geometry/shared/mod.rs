@@ -3,4 +3,5 @@
 pub(crate) mod faces;
 pub(crate) mod kept;
 pub(crate) mod planting;
+pub(crate) mod skin;
 pub(crate) mod source;

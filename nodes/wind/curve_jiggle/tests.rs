@@ -359,3 +359,21 @@ fn empty_single_cv_and_folded_curves_work() {
     let empty = Geometry::from(Component::mesh(Vec::new(), Vec::new(), Vec::new()).unwrap());
     assert_eq!(bits(&jiggled().input(SKIN, empty).at(9.0).cook()), bits(&jiggled().at(9.0).cook()));
 }
+
+#[test]
+fn outside_a_group_curves_keep_their_bits() {
+    let grouped = |frame: Frame| {
+        let mut curves = blown(frame);
+        let part = curves.part_mut(Kind::Curves).unwrap();
+        part.set(Attr::<i32>::element("third"), (0..9).map(|curve| curve % 3).collect()).unwrap();
+        curves
+    };
+    let swing = |name: &str| bench(&NODE).moving(CURVES, grouped).set(GROUP, name.into()).at(9.0).cook();
+    let (all, third) = (swing(""), swing("third"));
+    let target = blown(Frame::whole(9));
+    for (cv, still) in target.curves().unwrap().positions().iter().enumerate() {
+        let expected = if cv / 5 % 3 == 0 { *still } else { all.curves().positions()[cv] };
+        assert_eq!(third.curves().positions()[cv].map(f32::to_bits), expected.map(f32::to_bits), "CV {cv}");
+    }
+    assert_ne!(all.curves().positions(), target.curves().unwrap().positions());
+}

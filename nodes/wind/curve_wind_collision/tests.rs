@@ -145,3 +145,31 @@ fn loft_keeps_a_share_of_the_height_of_a_curve_blown_flat() {
     assert_eq!(height(blown().set(LOFT, 0.5).set(COHERENCE, 1.0)), height(blown().set(COHERENCE, 1.0)));
     assert_eq!(height(blown().set(LOFT, 0.5).set(OFFSET_SCALE, 0.2)), height(blown().set(OFFSET_SCALE, 0.2)));
 }
+
+/// Of two curves blown through the floor the one in the group stops at it, as without a group; the other keeps its bits, and
+/// counts nowhere.
+#[test]
+fn outside_a_group_curves_keep_their_bits() {
+    let two = |points: [[[f32; 3]; 2]; 2], rows: [i32; 2]| -> Geometry {
+        let mut curves = Component::curves(vec![2, 2], points.concat()).unwrap();
+        curves.set(Attr::<i32>::element("some"), rows.to_vec()).unwrap();
+        curves.into()
+    };
+    let goal = [[[0.0, 0.5, 0.0], [0.6, -0.3, 0.0]], [[-0.0, 0.5, 3.0], [0.6, -0.3, 3.0]]];
+    let rest = goal.map(|[root, _]| [root, [root[0], 1.5, root[2]]]);
+    let cook = |name: &str, rows: [i32; 2]| {
+        let bench = bench(&NODE).input(CURVES, two(goal, rows)).input(REST, two(rest, [1, 1]));
+        bench.input(COLLIDERS, floor(0.0)).set(GROUP, name.into()).cook()
+    };
+    let all = cook("", [0, 0]);
+    for rows in [[0, 1], [2, 0], [0, 0], [1, 1]] {
+        let out = cook("some", rows);
+        for (cv, now) in out.curves().positions().iter().enumerate() {
+            let expected = if rows[cv / 2] == 0 { goal[cv / 2][cv % 2] } else { all.curves().positions()[cv] };
+            assert_eq!(now.map(f32::to_bits), expected.map(f32::to_bits), "{rows:?}, CV {cv}");
+        }
+        let inside = rows.iter().filter(|row| **row != 0).count() as f64;
+        assert_eq!((out.metrics["contacts"], out.metrics["crossings_left"]), (inside, 0.0));
+        assert_eq!(out.curves().get(UNFREED_SEGMENTS), Some(&[0, 0][..]));
+    }
+}

@@ -366,3 +366,66 @@ fn ten_thousand_gusts_terminate() {
     assert!(out.metrics["active_gusts"] > 3000.0);
     assert!(envelope(&out).iter().all(|x| *x == 1.0));
 }
+
+#[test]
+fn outside_a_group_the_envelope_keeps_its_bits() {
+    let incoming: Vec<f32> = (0..180).map(|cv| cv as f32 / 180.0).collect();
+    let mut curves = field(6);
+    let part = curves.part_mut(Kind::Curves).unwrap();
+    part.set(ENVELOPE, incoming.clone()).unwrap();
+    part.set(Attr::<i32>::element("third"), (0..36).map(|curve| curve % 3).collect()).unwrap();
+    part.set(Attr::<f32>::point("tips"), (0..180).map(|cv| if cv % 5 == 4 { 0.5 } else { 0.0 }).collect()).unwrap();
+    let all = single(curves.clone()).at(20.0).cook();
+    for name in ["third", "tips"] {
+        let inside = |cv: usize| if name == "third" { !(cv / 5).is_multiple_of(3) } else { cv % 5 == 4 };
+        let out = single(curves.clone()).set(GROUP, name.into()).at(20.0).cook();
+        for (cv, value) in envelope(&out).iter().enumerate() {
+            let expected = if inside(cv) { envelope(&all)[cv] } else { incoming[cv] };
+            assert_eq!(value.to_bits(), expected.to_bits(), "{name}, CV {cv}");
+        }
+        assert!((1.0..all.metrics["reached_points"]).contains(&out.metrics["reached_points"]));
+    }
+    // Without an envelope, what is outside has 1.
+    let part = curves.part_mut(Kind::Curves).unwrap();
+    part.remove(Owner::Point, ENVELOPE.name);
+    let out = single(curves.clone()).set(GROUP, "tips".into()).at(20.0).cook();
+    assert!(envelope(&out).iter().enumerate().all(|(cv, value)| cv % 5 == 4 || *value == 1.0));
+    let error = single(curves).set(GROUP, "tipz".into()).at(20.0).try_cook().unwrap_err();
+    assert_eq!(error.to_string(), "`group` is `tipz`, which the curves do not have; did you mean `tips`?");
+}
+
+#[test]
+fn strength_multiplies_each_influence() {
+    let gust = single(dot(5.0)).set(DISTANCE, 3.0).set(FALLOFF, ramp(&[[0.0, 0.25]])).set(BASE, 0.125);
+    let at = |bench: Bench| envelope(&bench.at(48.0).cook())[0];
+    for (strength, expected) in [(0.0, 0.125), (0.5, 0.25), (1.0, 0.375), (2.0, 0.625), (9.0, 1.0)] {
+        assert_eq!(at(gust.clone().set(STRENGTH, strength)), expected, "{strength}");
+    }
+    // A control of strength ½ about the CV, full at its centre: 0.125 + 2 · 0.5 · 0.25.
+    let by_hand = |strength: f32| {
+        let outline = outline(ControlShape::Sphere, 1.0, 1).into_iter().map(|[x, y, z]| [x + 5.0, y, z]).collect();
+        let keys = Ramp::constant(0.25);
+        let points = gust_control::component(outline, ControlShape::Sphere, 1.0, 0.5, &keys).unwrap();
+        at(gust.clone().set(NUM_GUSTS, 0).input(CONTROLS, Geometry::from(points)).set(STRENGTH, strength))
+    };
+    assert_eq!([by_hand(0.0), by_hand(1.0), by_hand(2.0)], [0.125, 0.25, 0.375]);
+}
+
+#[test]
+fn gust_is_what_scales_the_envelope_which_never_exceeds_1() {
+    let curves = dot(5.0);
+    let felt = |incoming: Option<f32>| {
+        let mut curves = curves.clone();
+        if let Some(incoming) = incoming {
+            curves.part_mut(Kind::Curves).unwrap().set(ENVELOPE, vec![incoming]).unwrap();
+        }
+        let out = single(curves).set(DISTANCE, 3.0).set(FALLOFF, ramp(&[[0.0, 0.5]])).at(48.0).cook();
+        (out.curves().get(GUST).unwrap()[0], envelope(&out)[0])
+    };
+    assert_eq!(felt(None), (0.5, 0.5));
+    assert_eq!(felt(Some(0.5)), (0.5, 0.25));
+    assert_eq!(felt(Some(8.0)), (0.5, 1.0));
+    assert_eq!(felt(Some(-1.0)), (0.5, 0.0));
+    let calm = bench(&NODE).input(CURVES, dot(5.0)).set(BASE, 1.0).cook();
+    assert_eq!(calm.curves().get(GUST), Some(&[1.0][..]));
+}

@@ -35,8 +35,8 @@ mod rotation;
 mod triangle_lanes;
 
 pub use binding::SkinBinding;
-pub(crate) use pose::rotate_orientation;
 pub use pose::{AttachedCurves, RootPose, attach_curves, rotate_orientations, rotate_vectors};
+pub(crate) use pose::{attach_curve, relative_stretch, rotate_orientation, tasks};
 pub use root_positions::RootPositions;
 pub use rotation::nearest_rotation;
 

@@ -37,20 +37,25 @@ const TASK: usize = 2048;
 pub fn attach_curves(starts: &[u32], points: &[[f32; 3]], poses: &[RootPose]) -> AttachedCurves {
     let mut out = vec![[0.0; 3]; points.len()];
     let length_error = each_curve(starts, poses, &mut out, points, &|pose, now, rest| {
-        let Some(root) = rest.first().map(|root| to_f64(*root)) else { return 0.0 };
-        for (now, rest) in now.iter_mut().zip(rest) {
-            let rest = to_f64(*rest);
-            let arm = rest - root;
-            // Added as a displacement, so that a still skin changes no bit.
-            *now = to_f32(rest + (pose.translation + (pose.rotation * arm - arm)));
-        }
+        attach_curve(pose, rest, now);
         relative_stretch(now, rest)
     });
     AttachedCurves { points: out, length_error }
 }
 
+/// Writes a curve moved by the pose of its root.
+pub(crate) fn attach_curve(pose: &RootPose, rest: &[[f32; 3]], now: &mut [[f32; 3]]) {
+    let Some(root) = rest.first().map(|root| to_f64(*root)) else { return };
+    for (now, rest) in now.iter_mut().zip(rest) {
+        let rest = to_f64(*rest);
+        let arm = rest - root;
+        // Added as a displacement, so that a still skin changes no bit.
+        *now = to_f32(rest + (pose.translation + (pose.rotation * arm - arm)));
+    }
+}
+
 /// Largest change of a segment's length ÷ the length of the rest curve; 0 if that is 0.
-fn relative_stretch(now: &[[f32; 3]], rest: &[[f32; 3]]) -> f64 {
+pub(crate) fn relative_stretch(now: &[[f32; 3]], rest: &[[f32; 3]]) -> f64 {
     let segment = |pair: &[[f32; 3]]| (to_f64(pair[1]) - to_f64(pair[0])).norm();
     let (mut whole, mut largest) = (0.0, 0.0_f64);
     for (now, rest) in now.windows(2).zip(rest.windows(2)) {
@@ -118,7 +123,7 @@ fn each_curve<T: Send + Sync>(
 }
 
 /// Splits the curves, and `out` with them, into tasks.
-fn tasks<'a, T>(starts: &[u32], mut out: &'a mut [T]) -> Vec<(Range<usize>, &'a mut [T])> {
+pub(crate) fn tasks<'a, T>(starts: &[u32], mut out: &'a mut [T]) -> Vec<(Range<usize>, &'a mut [T])> {
     let curves = starts.len().saturating_sub(1);
     let (mut tasks, mut first) = (Vec::new(), 0);
     while first < curves {

@@ -8,7 +8,7 @@ use nalgebra::Quaternion;
 use numerics::vector::{self, DQuat, DVec3, Vec3, to_f32, to_f64};
 
 /// Length, in gaps, at the start of the first segment that is not tested if the root may lie on the skin.
-const SKIPPED_GAPS: f64 = 5.0;
+pub(super) const SKIPPED_GAPS: f64 = 5.0;
 
 /// An input curve, and where its result is written.
 pub(super) struct Hair<'a> {

@@ -22,7 +22,7 @@ mod resample;
 mod weights;
 
 pub use blend::{BlendedHairs, CurveDomain, HairAndGuidePoses, HairBlend, blend_hairs};
-pub use resample::ResampledGuides;
+pub use resample::{CurveSample, ResampledGuides, even_samples};
 pub use weights::{GuideWeight, GuideWeights, MAX_GUIDES, OrientedPoint, guide_weights};
 
 #[cfg(test)]

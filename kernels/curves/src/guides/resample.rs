@@ -9,7 +9,7 @@ use numerics::vector::{DVec3, to_f64};
 pub struct ResampledGuides {
     segments: usize,
     pieces: Vec<GuideSegment>,
-    samples: Vec<GuideSample>,
+    samples: Vec<CurveSample>,
 }
 
 /// A segment of a guide.
@@ -21,15 +21,35 @@ pub(super) struct GuideSegment {
     pub(super) length: f64,
 }
 
-/// The position on a guide that corresponds to a hair's CV.
+/// A position along a curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct GuideSample {
-    /// The CV before, as a row of the guides' points.
-    pub(super) before: u32,
+pub struct CurveSample {
+    /// The CV before, as a row of the curves' points.
+    pub before: u32,
     /// The CV after.
-    pub(super) after: u32,
+    pub after: u32,
     /// Interpolation: 0 at the CV before, 1 at the one after.
-    pub(super) fraction: f32,
+    pub fraction: f32,
+}
+
+/// `counts[i]` positions (1 or more) on each of the curves `points[starts[i]..starts[i + 1]]`, evenly spaced along its length,
+/// from exactly its root to exactly its tip; of one, the tip. All are at the root where a curve has no length, but the last.
+///
+/// # Panics
+/// If `starts` does not run from 0 to the number of points, a curve has no point, or there are fewer `counts`.
+pub fn even_samples(starts: &[u32], points: &[[f32; 3]], counts: &[u32]) -> Vec<CurveSample> {
+    let curves: Vec<usize> = (0..starts.len().saturating_sub(1)).collect();
+    let of_task = |_, curves: &[usize]| {
+        let mut samples = Vec::new();
+        for curve in curves {
+            let first = samples.len();
+            samples.resize(first + counts[*curve] as usize, CurveSample { before: 0, after: 0, fraction: 0.0 });
+            let cvs = starts[*curve] as usize..starts[*curve + 1] as usize;
+            cut_evenly(starts[*curve], &points[cvs], &mut samples[first..]);
+        }
+        samples
+    };
+    parallel::concat(parallel::map(curves.chunks(TASK), of_task))
 }
 
 /// Number of guides in a task.
@@ -43,7 +63,7 @@ impl ResampledGuides {
     pub fn new(starts: &[u32], points: &[[f32; 3]], cvs: usize) -> Self {
         let segments = cvs.saturating_sub(1);
         let guides = starts.len().saturating_sub(1);
-        let mut samples = vec![GuideSample { before: 0, after: 0, fraction: 0.0 }; guides * cvs];
+        let mut samples = vec![CurveSample { before: 0, after: 0, fraction: 0.0 }; guides * cvs];
         let mut pieces = vec![GuideSegment { chord: DVec3::zeros(), length: 0.0 }; guides * segments];
         parallel::for_each(samples.chunks_mut(TASK * cvs), |task, samples| {
             for (guide, samples) in (task * TASK..).zip(samples.chunks_mut(cvs)) {
@@ -69,7 +89,7 @@ impl ResampledGuides {
         &self.pieces[guide * self.segments..(guide + 1) * self.segments]
     }
 
-    pub(super) fn samples(&self, guide: usize) -> &[GuideSample] {
+    pub(super) fn samples(&self, guide: usize) -> &[CurveSample] {
         &self.samples[guide * (self.segments + 1)..(guide + 1) * (self.segments + 1)]
     }
 
@@ -87,14 +107,19 @@ impl ResampledGuides {
 }
 
 /// The positions of the CVs of a hair on a guide whose first CV is row `start`.
-fn cut(start: u32, points: &[[f32; 3]], samples: &mut [GuideSample]) {
-    let last = points.len() - 1;
+fn cut(start: u32, points: &[[f32; 3]], samples: &mut [CurveSample]) {
     if points.len() == samples.len() {
         for (k, sample) in samples.iter_mut().enumerate() {
-            *sample = GuideSample { before: start + k as u32, after: start + k as u32, fraction: 0.0 };
+            *sample = CurveSample { before: start + k as u32, after: start + k as u32, fraction: 0.0 };
         }
         return;
     }
+    cut_evenly(start, points, samples);
+}
+
+/// The same for any number of CVs: evenly spaced.
+fn cut_evenly(start: u32, points: &[[f32; 3]], samples: &mut [CurveSample]) {
+    let last = points.len() - 1;
     let segment = |k: usize| (to_f64(points[k + 1]) - to_f64(points[k])).norm();
     let whole: f64 = (0..last).map(segment).sum();
     let steps = (samples.len() - 1).max(1) as f64;
@@ -109,17 +134,17 @@ fn cut(start: u32, points: &[[f32; 3]], samples: &mut [GuideSample]) {
         }
         let fraction = if here > 0.0 { ((target - passed) / here).clamp(0.0, 1.0) } else { 0.0 };
         let after = (k + 1).min(last) as u32;
-        *sample = GuideSample { before: start + k as u32, after: start + after, fraction: fraction as f32 };
+        *sample = CurveSample { before: start + k as u32, after: start + after, fraction: fraction as f32 };
     }
     // Exactly the tip, whatever rounding the sum has.
     if let [_, .., tip] = samples {
-        *tip = GuideSample { before: start + last as u32, after: start + last as u32, fraction: 0.0 };
+        *tip = CurveSample { before: start + last as u32, after: start + last as u32, fraction: 0.0 };
     }
 }
 
 /// The segments between `samples`.
-fn measure(points: &[[f32; 3]], samples: &[GuideSample], pieces: &mut [GuideSegment]) {
-    let at = |sample: &GuideSample| {
+fn measure(points: &[[f32; 3]], samples: &[CurveSample], pieces: &mut [GuideSegment]) {
+    let at = |sample: &CurveSample| {
         let (before, after) = (to_f64(points[sample.before as usize]), to_f64(points[sample.after as usize]));
         before + (after - before) * f64::from(sample.fraction)
     };
@@ -130,7 +155,7 @@ fn measure(points: &[[f32; 3]], samples: &[GuideSample], pieces: &mut [GuideSegm
 }
 
 /// Length along a guide from one sample to another, metres.
-fn along(points: &[[f32; 3]], from: &GuideSample, to: &GuideSample, at: &impl Fn(&GuideSample) -> DVec3) -> f64 {
+fn along(points: &[[f32; 3]], from: &CurveSample, to: &CurveSample, at: &impl Fn(&CurveSample) -> DVec3) -> f64 {
     let between = from.before + 1..=to.before;
     let mut here = at(from);
     let mut sum = 0.0;

@@ -23,7 +23,7 @@ pub struct OrientedPoint {
 pub struct GuideWeight {
     /// Index of the guide.
     pub guide: u32,
-    /// Its weight; those of one hair sum to 1.
+    /// Its weight; those of one hair sum to 1, or to less after [`GuideWeights::within`].
     pub weight: f32,
     /// Rotation from the guide's frame to the hair's, at rest.
     pub rotation: Quat,
@@ -40,6 +40,27 @@ impl GuideWeights {
     /// The guides of a hair, by decreasing weight.
     pub fn of(&self, hair: usize) -> &[GuideWeight] {
         &self.weights[hair * self.per_hair..(hair + 1) * self.per_hair]
+    }
+
+    /// The weights that are left where guides act within `radius` metres alone: each is scaled by (1 − (d ÷ radius)²)²,
+    /// d being the distance of the guide as weights count it. `guides` and `hairs` are those of the weights.
+    ///
+    /// # Panics
+    /// If there are fewer `guides` or `hairs`.
+    #[must_use]
+    pub fn within(mut self, guides: &[OrientedPoint], hairs: &[OrientedPoint], radius: f32) -> Self {
+        if self.per_hair > 0 {
+            for (weights, hair) in self.weights.chunks_mut(self.per_hair).zip(hairs) {
+                for weight in weights {
+                    let guide = &guides[weight.guide as usize];
+                    let away = vector::length(vector::sub(guide.position, hair.position));
+                    let share = apparent(away, vector::dot(guide.normal, hair.normal)) / radius;
+                    let left = if share < 1.0 { 1.0 - share * share } else { 0.0 };
+                    weight.weight *= left * left;
+                }
+            }
+        }
+        self
     }
 
     /// Number of hairs; 0 without guides.
@@ -178,13 +199,18 @@ impl<'a> GuideSearch<'a> {
         let mut distances = F32x16::splat(0.0);
         for lane in 0..LANES {
             let away = vector::length(vector::sub(get(&block.corners[0], lane), at));
-            let cosine = vector::dot(get(normals, lane), normal);
-            let cosine = if cosine < 1.0 { cosine } else { 1.0 };
-            let cosine = if cosine > -1.0 { cosine } else { -1.0 };
-            distances.0[lane] = away * ((2.0 + BEHIND) / (1.0 + cosine + BEHIND));
+            distances.0[lane] = apparent(away, vector::dot(get(normals, lane), normal));
         }
         distances
     }
+}
+
+/// The distance at which a guide counts that is `away`, given the cosine of the angle between the normals.
+#[inline(always)]
+fn apparent(away: f32, cosine: f32) -> f32 {
+    let cosine = if cosine < 1.0 { cosine } else { 1.0 };
+    let cosine = if cosine > -1.0 { cosine } else { -1.0 };
+    away * ((2.0 + BEHIND) / (1.0 + cosine + BEHIND))
 }
 
 /// Larger than any distance between two points, in units of the search.

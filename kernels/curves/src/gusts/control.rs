@@ -54,6 +54,13 @@ impl Control {
         Self { shape, centre: centre.into(), axes, outer, ramp, strength, inverse: inverse(axes) }
     }
 
+    /// The control with its influence multiplied.
+    #[must_use]
+    pub fn times(mut self, factor: f32) -> Self {
+        self.strength *= factor;
+        self
+    }
+
     pub(super) fn centre(&self) -> DVec3 {
         self.centre
     }

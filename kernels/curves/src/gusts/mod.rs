@@ -1,6 +1,6 @@
 //! Gusts: regions that pass over points and raise the wind there (W5).
 //!
-//! The value at a point is `clamp(base + Σ influences, 0, 1)`: first the gusts' spheres, then the controls, each in
+//! The value at a point is `clamp(base + Σ influences, 0, 1)`, times an incoming value and at most 1: first the gusts' spheres, then the controls, each in
 //! their order. The influence of a sphere is 1 at its centre and falls off to 0 at its boundary; that of a control is
 //! its ramp over the distance in the control's own space.
 //!
@@ -36,7 +36,7 @@ pub struct Sphere {
     pub centre: [f64; 3],
     /// Points farther from the centre are not reached. A gust with a radius below [`SMALLEST`] reaches none.
     pub radius: f32,
-    /// Factor of its influence, 0..1.
+    /// Factor of its influence, 0 or more.
     pub strength: f32,
     /// Fraction of the radius by which noise may dent the sphere, 0..1.
     pub noise: f32,
@@ -104,7 +104,7 @@ pub fn evaluate_on(path: Path, points: &[[f32; 3]], gusts: &Gusts<'_>) -> Influe
         let incoming = gusts.incoming.map(|incoming| &incoming[task * TASK..][..points.len()]);
         let reached = if prepared.boxes.len() > 0 { prepared.task(path, points, out) } else { 0 };
         if let Some(incoming) = incoming {
-            multiply(out, incoming);
+            scale(out, incoming);
         }
         reached
     });
@@ -162,10 +162,11 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// Multiplies by the incoming values.
-fn multiply(values: &mut [f32], incoming: &[f32]) {
+/// Multiplies values by those incoming, of which below 0 or NaN counts as 0; none is above 1 then.
+pub fn scale(values: &mut [f32], incoming: &[f32]) {
     for (value, incoming) in values.iter_mut().zip(incoming) {
         *value *= if *incoming > 0.0 { *incoming } else { 0.0 };
+        *value = if *value > 1.0 { 1.0 } else { *value };
     }
 }
 

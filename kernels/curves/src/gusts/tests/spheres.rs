@@ -89,7 +89,7 @@ fn incoming_values_scale_the_result_and_negative_or_nan_counts_as_0() {
     let falloff = one();
     let spheres = [sphere([0.0; 3], 1.0)];
     let gusts = Gusts { base: 0.25, incoming: Some(&incoming), ..only(&falloff, &spheres) };
-    assert_eq!(evaluate(&[[0.0; 3]; 4], &gusts).values, [0.5, 2.0, 0.0, 0.0]);
+    assert_eq!(evaluate(&[[0.0; 3]; 4], &gusts).values, [0.5, 1.0, 0.0, 0.0], "at most 1");
     assert_eq!(evaluate(&[[5.0; 3]; 4], &gusts).values, [0.125, 0.5, 0.0, 0.0]);
 }
 

@@ -1,0 +1,447 @@
+//! Curves that were moved without regard to the skin, kept out of it: the kernel of Curve_Deform's `keep_out`.
+//!
+//! Most curves that follow collided guides do not cross the skin. One that stays above everything near its root (see
+//! [`half_space`](super::half_space)) needs no query of the tree; of the others, those that cross the skin turn again
+//! from their rest shape until they meet it, as in [`super::collide()`], and then as far back towards their goal as they
+//! stay free: a curve that only just enters the skin moves by little, so that none jumps as it touches it.
+//!
+//! A curve whose root has been lifted off the skin starts from its rest shape lifted as far. One whose rest shape crosses the
+//! skin is lifted until its root is outside by the gap, and turned out of the skin as far as possible. Of a curve that is
+//! not lifted the start, which touches the skin, is not tested. Surfaces are obstacles, not volumes: a curve wholly inside
+//! stays there.
+
+use super::crossing::first_crossing;
+use super::hair::{SKIPPED_GAPS, part_way};
+use super::half_space::HalfSpace;
+use super::segment_turn::{Nearby, Segment, gather};
+use super::{Collide, ContactMethod, SkinSurface, collide, perpendicular};
+use crate::attach::{RootPose, attach_curve};
+use numerics::masked::Masked;
+use numerics::parallel;
+use numerics::simd::{Path, kernel};
+use numerics::tree::TriangleTree;
+use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
+use std::ops::Range;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Number of curves in a task.
+const TASK_CURVES: usize = 256;
+
+/// Number of curves that enter the skin in a task.
+const SETTLED_CURVES: usize = 64;
+
+/// Halvings of the turn between a curve's goal and where its collision left it.
+const HALVINGS: usize = 4;
+
+/// Height of a root, in gaps, from which on its curve is tested from its root on: from a height h a segment turns by an arc
+/// of π/2·h before it meets a plane, which is more than the gap.
+const LIFTED: f64 = 0.7;
+
+/// Number of successive segments that share one query of the tree.
+const GATHERED_SEGMENTS: usize = 6;
+
+/// The skin that curves are kept out of, and their shapes at rest.
+#[derive(Clone, Copy)]
+pub struct KeepOut<'a> {
+    /// The skin.
+    pub skin: SkinSurface<'a>,
+    /// The curves at rest.
+    pub rest: &'a [Vec3],
+    /// How the skin has moved and turned each root since rest; `None` if it has not.
+    pub poses: Option<&'a [RootPose]>,
+    /// Arc length kept from contacts, metres. The first five of a curve whose root is not lifted are not tested.
+    pub gap: f64,
+    /// What is known of these curves on this skin.
+    pub clearance: &'a Clearance,
+}
+
+/// Where curves meet nothing. Keep it while skin, rest shapes, poses and gap do not change: it is found at the second
+/// use, because on a skin that moves in each frame it would cost more than it saves.
+#[derive(Debug, Default)]
+pub struct Clearance {
+    uses: AtomicU32,
+    half_spaces: OnceLock<Vec<HalfSpace>>,
+}
+
+/// What [`keep_out`] did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[must_use]
+pub struct KeptOut {
+    /// Curves that had entered the skin.
+    pub kept_out: u64,
+    /// Curves among them that cross the skin at rest, even with their roots lifted.
+    pub started_inside: u64,
+    /// Segments of the curves kept out that still cross the skin.
+    pub crossings_left: u64,
+    /// Largest change of a segment's length ÷ curve length among the curves kept out.
+    pub length_error: f64,
+}
+
+/// Replaces each of the curves `points[starts[i]..starts[i + 1]]` that crosses the skin by one that turned towards it
+/// from rest until it met the skin.
+///
+/// # Panics
+/// If `starts` does not run up to the number of points, of `points` and of the rest shapes.
+pub fn keep_out(starts: &[u32], points: &mut [Vec3], how: &KeepOut<'_>) -> KeptOut {
+    keep_out_on(Path::chosen(), starts, points, how)
+}
+
+/// [`keep_out`] on a given SIMD path.
+pub(super) fn keep_out_on(path: Path, starts: &[u32], points: &mut [Vec3], how: &KeepOut<'_>) -> KeptOut {
+    let curves = starts.len().saturating_sub(1);
+    let half_spaces = how.clearance.used(path, starts, how);
+    let tasks = (0..curves).step_by(TASK_CURVES).map(|first| first..curves.min(first + TASK_CURVES));
+    let entered = parallel::map(tasks, |_, curves| entering(path, curves, starts, points, how, half_spaces));
+    let entered = parallel::concat(entered);
+    let mut kept =
+        KeptOut { started_inside: entered.iter().map(|one| u64::from(one.at_rest)).sum(), ..KeptOut::default() };
+    for lifted in [false, true] {
+        let curves: Vec<Entering> = entered.iter().filter(|one| one.lifted == lifted).copied().collect();
+        if !curves.is_empty() {
+            turn_out(path, starts, points, how, &curves, &mut kept);
+        }
+    }
+    kept
+}
+
+/// A curve that crosses the skin.
+#[derive(Clone, Copy)]
+struct Entering {
+    curve: u32,
+    /// Whether it does so at rest.
+    at_rest: bool,
+    /// Whether its root is off the skin.
+    lifted: bool,
+    /// What lifts it.
+    shift: DVec3,
+}
+
+/// Moves CVs; without a shift they keep their bits.
+fn shifted(cvs: &mut [Vec3], shift: &DVec3) {
+    if *shift != DVec3::zeros() {
+        cvs.iter_mut().for_each(|cv| *cv = to_f32(to_f64(*cv) + shift));
+    }
+}
+
+/// Turns curves, all or none of them lifted, out of the skin.
+fn turn_out(
+    path: Path,
+    starts: &[u32],
+    points: &mut [Vec3],
+    how: &KeepOut<'_>,
+    curves: &[Entering],
+    kept: &mut KeptOut,
+) {
+    let lifted = curves[0].lifted;
+    let range = |one: &Entering| starts[one.curve as usize] as usize..starts[one.curve as usize + 1] as usize;
+    let (mut own, mut goal, mut rest) = (vec![0], Vec::new(), Vec::new());
+    for one in curves {
+        let (cvs, first) = (range(one), goal.len());
+        goal.extend_from_slice(&points[cvs.clone()]);
+        shifted(&mut goal[first..], &one.shift);
+        rest.resize(goal.len(), [0.0; 3]);
+        how.write_rest(one.curve as usize, cvs, goal[first], &mut rest[first..]);
+        own.push(goal.len() as u32);
+    }
+    let obstacles = [how.skin.tree];
+    let collided = collide(&own, &rest, &goal, &how.collision(&obstacles, lifted));
+    let found = Entered {
+        starts: &own,
+        rest: &rest,
+        goal: &goal,
+        free: &collided.points,
+        crossings: &collided.crossings,
+        untested: how.untested(lifted),
+    };
+    let tasks = (0..curves.len()).step_by(SETTLED_CURVES).map(|first| first..curves.len().min(first + SETTLED_CURVES));
+    let settled = parallel::map(tasks, |_, curves| settle(path, curves, &found, how.skin.tree));
+    let settled = parallel::concat(settled);
+    for (one, ends) in curves.iter().zip(own.windows(2)) {
+        let (mine, now) = (ends[0] as usize..ends[1] as usize, range(one));
+        kept.kept_out += u64::from(settled[mine.clone()] != points[now.clone()]);
+        points[now].copy_from_slice(&settled[mine]);
+    }
+    kept.crossings_left += collided.crossings_left;
+    // Those that settled have lengths as exact.
+    kept.length_error = kept.length_error.max(collided.length_error);
+}
+
+/// Curves that entered the skin.
+#[derive(Clone, Copy)]
+struct Entered<'a> {
+    starts: &'a [u32],
+    rest: &'a [Vec3],
+    goal: &'a [Vec3],
+    /// As the collision left them, and the number of segments that cross the skin.
+    free: &'a [Vec3],
+    crossings: &'a [i32],
+    /// Length at the start of each that is not tested.
+    untested: f64,
+}
+
+kernel! {
+    /// The shapes of `curves`, as near to their goals as they stay free.
+    fn settle(curves: Range<usize>, entered: &Entered<'_>, skin: &TriangleTree) -> Vec<Vec3> = settle_task;
+}
+
+#[inline(always)]
+fn settle_task(curves: Range<usize>, entered: &Entered<'_>, skin: &TriangleTree) -> Vec<Vec3> {
+    let mut out = entered.free[entered.starts[curves.start] as usize..entered.starts[curves.end] as usize].to_vec();
+    let (base, untested) = (entered.starts[curves.start] as usize, entered.untested);
+    let (mut nearby, mut pose) = (Nearby::default(), Vec::new());
+    for curve in curves {
+        let cvs = entered.starts[curve] as usize..entered.starts[curve + 1] as usize;
+        let [rest, goal, free] = [entered.rest, entered.goal, entered.free].map(|points| &points[cvs.clone()]);
+        // Of a curve that could not be freed no pose is better.
+        if entered.crossings[curve] > 0 {
+            continue;
+        }
+        // No closures here: they are not compiled for the kernel's path.
+        let outside = tested_start(rest, untested);
+        let (mut crossing, mut clear) = (0.0, 1.0);
+        for _ in 0..HALVINGS {
+            let share = 0.5 * (crossing + clear);
+            pose_between(goal, free, share, &mut pose);
+            if crosses(&pose, [outside, tested_start(&pose, untested)], skin, &mut nearby) {
+                crossing = share;
+            } else {
+                clear = share;
+                out[cvs.start - base..cvs.end - base].copy_from_slice(&pose);
+            }
+        }
+    }
+    out
+}
+
+/// The curve whose segments, as long as those of `from`, have turned by this share of their turn from `from` to `to`.
+fn pose_between(from: &[Vec3], to: &[Vec3], share: f64, pose: &mut Vec<Vec3>) {
+    pose.clear();
+    let mut at = to_f64(from[0]);
+    pose.push(from[0]);
+    for k in 0..from.len() - 1 {
+        let [from, to] = [from, to].map(|cvs| to_f64(cvs[k + 1]) - to_f64(cvs[k]));
+        if let (Some(before), Some(after)) = (from.try_normalize(0.0), to.try_normalize(0.0)) {
+            let direction = part_way(&before, &after, &perpendicular(&before, &DVec3::zeros()), share);
+            at = to_f64(pose[k]) + direction * from.norm();
+        }
+        pose.push(to_f32(at));
+    }
+}
+
+impl KeepOut<'_> {
+    /// Length at the start of a curve that is not tested.
+    fn untested(&self, lifted: bool) -> f64 {
+        if lifted { 0.0 } else { SKIPPED_GAPS * self.gap }
+    }
+
+    /// The root of a curve's rest shape, its CV `cv`, on the skin as it is now.
+    #[inline(always)]
+    fn root(&self, curve: usize, cv: usize) -> DVec3 {
+        let moved = self.poses.map_or(DVec3::zeros(), |poses| poses[curve].translation);
+        to_f64(to_f32(to_f64(self.rest[cv]) + moved))
+    }
+
+    /// The rest shape of a curve on the skin as it is now, moved so that it starts at `root`.
+    fn write_rest(&self, curve: usize, cvs: Range<usize>, root: Vec3, out: &mut [Vec3]) {
+        match self.poses {
+            Some(poses) => attach_curve(&poses[curve], &self.rest[cvs], out),
+            None => out.copy_from_slice(&self.rest[cvs]),
+        }
+        let moved = to_f64(root) - to_f64(out[0]);
+        shifted(out, &moved);
+    }
+
+    fn collision<'o>(&self, obstacles: &'o [&'o TriangleTree], lifted: bool) -> Collide<'o>
+    where
+        Self: 'o,
+    {
+        Collide {
+            obstacles,
+            skin: None,
+            method: ContactMethod::Exact,
+            coherence: 0.0,
+            gap: self.gap,
+            // Lifts nothing without a skin; it says whether the start of a curve is tested.
+            offset_root: if lifted { self.gap } else { 0.0 },
+            offset_scale: None,
+            loft: 0.0,
+            at_rest: None,
+            blend: Masked::uniform(1.0),
+            width: Masked::uniform(0.0),
+        }
+    }
+}
+
+impl Clearance {
+    /// Counts a use, and finds half-spaces at the second one. Uses beside it get none, instead of waiting for a thread
+    /// that may be waiting for them.
+    fn used(&self, path: Path, starts: &[u32], how: &KeepOut<'_>) -> &[HalfSpace] {
+        if self.uses.fetch_add(1, Ordering::Relaxed) == 1 {
+            let mut found = vec![HalfSpace::default(); starts.len().saturating_sub(1)];
+            parallel::for_each(found.chunks_mut(TASK_CURVES), |task, out| {
+                look_up(path, task * TASK_CURVES, starts, how, out);
+            });
+            let _ = self.half_spaces.set(found);
+        }
+        self.half_spaces.get().map_or(&[], Vec::as_slice)
+    }
+}
+
+kernel! {
+    fn look_up(first: usize, starts: &[u32], how: &KeepOut<'_>, out: &mut [HalfSpace]) = look_up_task;
+}
+
+#[inline(always)]
+fn look_up_task(first: usize, starts: &[u32], how: &KeepOut<'_>, out: &mut [HalfSpace]) {
+    let obstacles = [how.skin.tree];
+    let collision = Collide { skin: Some(how.skin), ..how.collision(&obstacles, false) };
+    let mut rest = Vec::new();
+    for (curve, out) in (first..).zip(out) {
+        let cvs = starts[curve] as usize..starts[curve + 1] as usize;
+        rest.resize(cvs.len(), [0.0; 3]);
+        let root = to_f32(how.root(curve, cvs.start));
+        how.write_rest(curve, cvs, root, &mut rest);
+        if rest.len() >= 2 && is_finite(&rest) {
+            *out = HalfSpace::of(&rest, &DVec3::zeros(), 0.0, &collision);
+        }
+    }
+}
+
+kernel! {
+    /// Those of `curves` that cross the skin, and whether they do at rest.
+    fn entering(
+        curves: Range<usize>,
+        starts: &[u32],
+        points: &[Vec3],
+        how: &KeepOut<'_>,
+        half_spaces: &[HalfSpace],
+    ) -> Vec<Entering> = entering_task;
+}
+
+#[inline(always)]
+fn entering_task(
+    curves: Range<usize>,
+    starts: &[u32],
+    points: &[Vec3],
+    how: &KeepOut<'_>,
+    half_spaces: &[HalfSpace],
+) -> Vec<Entering> {
+    let (mut entered, mut rest) = (Vec::new(), Vec::new());
+    let mut nearby = Nearby::default();
+    for curve in curves {
+        let cvs = starts[curve] as usize..starts[curve + 1] as usize;
+        let now = &points[cvs.clone()];
+        if now.len() < 2 || !is_finite(now) {
+            continue;
+        }
+        let root = how.root(curve, cvs.start);
+        let lifted = (to_f64(now[0]) - root).norm() >= LIFTED * how.gap;
+        let untested = how.untested(lifted);
+        if let Some(half_space) = half_spaces.get(curve)
+            && frees(half_space, &root, now, untested)
+        {
+            continue;
+        }
+        rest.resize(now.len(), [0.0; 3]);
+        how.write_rest(curve, cvs, now[0], &mut rest);
+        let (outside, start) = (tested_start(&rest, untested), tested_start(now, untested));
+        if crosses(now, [outside, start], how.skin.tree, &mut nearby) {
+            let mut one = Entering { curve: curve as u32, at_rest: false, lifted, shift: DVec3::zeros() };
+            if crosses(&rest, [outside; 2], how.skin.tree, &mut nearby) {
+                (one.lifted, one.shift) = (true, how.skin.lift(now[0], how.gap).shift);
+                shifted(&mut rest, &one.shift);
+                one.at_rest = crosses(&rest, [Some(rest[0]); 2], how.skin.tree, &mut nearby);
+            }
+            entered.push(one);
+        }
+    }
+    entered
+}
+
+fn is_finite(cvs: &[Vec3]) -> bool {
+    cvs.as_flattened().iter().all(|x| x.is_finite())
+}
+
+/// Whether all of a curve, but the length at its start that is not tested, is in the half-space of a curve with this root.
+#[inline(always)]
+fn frees(half_space: &HalfSpace, root: &DVec3, cvs: &[Vec3], untested: f64) -> bool {
+    let largest = cvs.iter().fold(0.0, |most: f32, cv| most.max(vector::largest(*cv)));
+    for k in 0..cvs.len() - 1 {
+        let (pivot, along) = (to_f64(cvs[k]), to_f64(cvs[k + 1]) - to_f64(cvs[k]));
+        let whole = along.norm();
+        let inner = if k == 0 { untested } else { 0.0 };
+        if whole <= inner {
+            continue;
+        }
+        let direction = along / whole;
+        let length = whole - inner;
+        let segment = Segment {
+            pivot: pivot + direction * inner,
+            from: direction,
+            to: direction,
+            axis: DVec3::zeros(),
+            before: DVec3::zeros(),
+            length,
+            half: 0.0,
+            gap: 0.0,
+            inner: 0.0,
+            rounding: 1.2e-7 * (f64::from(largest) + whole),
+        };
+        if !half_space.frees(root, &segment) {
+            return false;
+        }
+    }
+    true
+}
+
+/// Where the tested part of a curve starts; `None` if its first segment is not tested.
+#[inline(always)]
+fn tested_start(cvs: &[Vec3], untested: f64) -> Option<Vec3> {
+    let along = to_f64(cvs[1]) - to_f64(cvs[0]);
+    let length = along.norm();
+    (length > untested).then(|| to_f32(to_f64(cvs[0]) + along * (untested / length)))
+}
+
+/// Whether a curve, whose tested part starts at `start`, crosses the skin. So does one whose start has passed through it
+/// since rest, when it was at `outside`.
+#[inline(always)]
+fn crosses<'t>(
+    cvs: &[Vec3],
+    [outside, start]: [Option<Vec3>; 2],
+    tree: &'t TriangleTree,
+    nearby: &mut Nearby<'t>,
+) -> bool {
+    let last = cvs.len() - 1;
+    for first in (0..last).step_by(GATHERED_SEGMENTS) {
+        let end = last.min(first + GATHERED_SEGMENTS);
+        let (mut low, mut high) = (cvs[first], cvs[first]);
+        let also = outside.filter(|_| first == 0);
+        for cv in cvs[first + 1..=end].iter().chain(&also) {
+            for axis in 0..3 {
+                low[axis] = low[axis].min(cv[axis]);
+                high[axis] = high[axis].max(cv[axis]);
+            }
+        }
+        gather(&[tree], low, high, nearby);
+        if nearby.is_empty() {
+            continue;
+        }
+        for k in first..end {
+            let Some(from) = (if k == 0 { start } else { Some(cvs[k]) }) else { continue };
+            if first_crossing(nearby, from, cvs[k + 1]).is_some() {
+                return true;
+            }
+        }
+        if let (Some(outside), Some(start), 0) = (outside, start, first)
+            && outside != start
+            && first_crossing(nearby, outside, start).is_some()
+        {
+            return true;
+        }
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,25 @@
+//! A groom that follows guides: the kernel of Curve_Deform.
+//!
+//! Each segment of a guide has a rotation since rest, in the frame of the guide's root: along the guide it is the product
+//! of the smallest rotations that bring its segments to their directions ([`GuideTurns`]), so it does not twist. A hair's
+//! segment turns by the weighted mean of its guides' rotations at the same fraction of their lengths, as quaternions,
+//! each rotated from the guide's frame to the hair's; then by the rotation of the hair's own root. Weights are those of
+//! [`crate::guides`]: they change continuously over the skin.
+//!
+//! Without a skin, a guide's root turns as the roots of the guides around it do ([`guide_poses`]), and hairs are carried
+//! by the weighted mean of their guides' motions ([`carried_poses`]).
+//!
+//! Guarantees: guides and skin at rest change no bit; if all of them move rigidly, so do hairs; segments keep their
+//! lengths up to the rounding of positions; a hair that is a guide, alone at its root, becomes that guide; the same bits
+//! on any number of threads. f64 inside. Metres.
+
+mod hairs;
+mod roots;
+mod turns;
+
+pub use hairs::{CurveDeform, DeformedCurves, deform_curves};
+pub use roots::{carried_poses, guide_poses};
+pub use turns::{GuideTurns, segment_middles};
+
+#[cfg(test)]
+mod tests;
