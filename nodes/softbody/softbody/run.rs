@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use bodies::collision::{CollisionScene, ContactParams, Ground, Obstacle, Overlap, Separation};
+use bodies::collision::{CaughtParticle, CollisionScene, ContactParams, Ground, Obstacle, Overlap, Separation};
 use bodies::mass_spring::{
     BodySolver, FrameReport, GoalSpring, Integrator, Pin, Plasticity, SoftBody, SolverFrame, State, flow, reset, tear,
 };
@@ -30,6 +30,7 @@ pub(super) struct Run {
     /// What overlapped at the start, and the number of frames since in which time passed.
     overlaps: Vec<Overlap>,
     frames_over: u32,
+    caught: Vec<CaughtParticle>,
     /// Metrics of the last step, or of the start.
     metrics: MetricValues,
     /// Computed from `inputs` only, and recomputed after a checkpoint.
@@ -76,6 +77,7 @@ impl Chain for Run {
             goals: GoalHistory::default(),
             overlaps: Vec::new(),
             frames_over: 0,
+            caught: Vec::new(),
             metrics: MetricValues::default(),
             setup: OnceLock::from(Arc::new(setup)),
             solving: Some(solving),
@@ -130,10 +132,14 @@ impl Run {
         }
         let overlaps = std::mem::take(&mut self.overlaps);
         let (over, seconds) = (self.frames_over, interval.seconds);
+        let caught = std::mem::take(&mut self.caught);
+        scene.caught = &caught;
         scene.separation = Some(Separation { overlaps: &overlaps, frames: SEPARATION_FRAMES, over, seconds });
         let mut goals = std::mem::take(&mut self.goals);
         let mut influences = self.influences(cx, &setup, &mut goals, interval)?;
+        let before = self.state.positions.clone();
         let report = self.solve(cx, &mut solving, &influences, &scene, interval)?;
+        self.caught = scene.caught_after(&before, &self.state.positions);
         let started_inside = self.metrics.get(STARTED_INSIDE).unwrap_or(0.0);
         self.metrics = measured(&report, &self.state);
         self.metrics.set(STARTED_INSIDE, started_inside);

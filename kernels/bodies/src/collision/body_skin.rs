@@ -1,10 +1,10 @@
 //! The skin of a body: its surface triangles, and which of their elements are too close at rest to count as contacts.
 
-use super::CollisionError;
 use super::closest_point::{ClosestPoint, along};
 use super::obstacle::{check_points, check_triangles};
 use super::surface::{Edge, Moment, NONE, TriangleSurface};
 use super::swept::Elements;
+use super::{CaughtParticle, CollisionError};
 use std::collections::VecDeque;
 
 /// An edge longer than this many times its rest length and the skin's mean edge is released.
@@ -110,6 +110,26 @@ impl BodySkin {
             }
         }
         ReleasedElements { edges, faces, particles }
+    }
+
+    /// These released elements, and the edges and triangles of particles on the wrong side of an obstacle, which would
+    /// keep them there.
+    pub(super) fn releasing(&self, released: &ReleasedElements, caught: &[CaughtParticle]) -> ReleasedElements {
+        let mut all = released.clone();
+        if caught.is_empty() {
+            return all;
+        }
+        let surface = &self.surface;
+        all.edges.resize(surface.edges.len(), false);
+        all.faces.resize(surface.triangles.len(), false);
+        let is_caught = |end: &u32| caught.binary_search_by_key(end, |caught| caught.particle).is_ok();
+        for (released, edge) in all.edges.iter_mut().zip(&surface.edges) {
+            *released |= edge.ends.iter().any(is_caught);
+        }
+        for (released, corners) in all.faces.iter_mut().zip(&surface.triangles) {
+            *released |= corners.iter().any(is_caught);
+        }
+        all
     }
 
     /// Number of edges released by obstacles with particles at `x`: those more than eight times as long as at rest

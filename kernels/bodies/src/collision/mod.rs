@@ -14,6 +14,7 @@
 //! crossing, are not reported; positions beyond the range of f32 are not found.
 
 mod body_skin;
+mod caught;
 mod closest_point;
 mod coplanarity;
 mod edge;
@@ -28,6 +29,7 @@ mod vertex;
 use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
 pub use body_skin::BodySkin;
 use body_skin::ReleasedElements;
+pub use caught::CaughtParticle;
 use closest_point::ClosestPoint;
 pub use motion::ObstaclePose;
 use numerics::parallel;
@@ -127,6 +129,8 @@ pub struct CollisionScene<'a> {
     pub self_contact: Option<ContactParams>,
     /// What is being pushed apart because it overlapped at the start.
     pub separation: Option<Separation<'a>>,
+    /// Particles on the wrong side of obstacles: those of the first obstacle by particle, then those of the next.
+    pub caught: &'a [CaughtParticle],
 }
 
 impl ContactFinder for CollisionScene<'_> {
@@ -141,8 +145,14 @@ impl ContactFinder for CollisionScene<'_> {
                 let faces = skin.faces.sweep(&boxes, 0.0);
                 let released = skin.released(query.from);
                 let meeting = |other: &usize| self.separating(index, OverlapPartner::Obstacle(*other)).is_none();
-                for obstacle in (0..self.obstacles.len()).filter(meeting).map(|other| &self.obstacles[other]) {
-                    self.against_obstacle(query, (skin, &released), &boxes, &faces, obstacle, out);
+                for obstacle in (0..self.obstacles.len()).filter(meeting) {
+                    let caught = self.caught_by(obstacle);
+                    let released = &skin.releasing(&released, caught);
+                    self.against_obstacle(query, (skin, released), &boxes, obstacle, &mut |meeting, tree| {
+                        meeting.particles(tree, out);
+                        meeting.points(&faces, out);
+                        meeting.edges(out);
+                    });
                 }
             }
         }
@@ -190,24 +200,25 @@ impl CollisionScene<'_> {
         if whole > 0.0 { sum / whole } else { 1.0 }
     }
 
-    /// Contacts of a skin, without its released elements, with an obstacle. `boxes` and `faces` are the swept boxes
-    /// of particles and of triangles.
+    /// Calls `act` with a skin, without its released elements, and an obstacle, unless they stay apart, and with the
+    /// swept boxes of the obstacle's triangles. `boxes` are those of the particles.
     fn against_obstacle(
         &self,
         query: &ContactQuery<'_>,
         (skin, released): (&BodySkin, &ReleasedElements),
         boxes: &[Cuboid],
-        faces: &BoxTree<'_>,
-        obstacle: &Obstacle,
-        out: &mut Vec<Contact>,
+        index: usize,
+        act: &mut dyn FnMut(&SkinObstaclePair<'_>, &BoxTree<'_>),
     ) {
+        let obstacle = &self.obstacles[index];
         let rules = ContactRules { gap: obstacle.thickness, reach: REACH * obstacle.thickness, push: true };
         let times = obstacle.motion.times(query.times, SAG * obstacle.thickness);
         let obstacle_poses: Vec<Vec<[f64; 3]>> = times.iter().map(|time| obstacle.at(*time)).collect();
         let obstacle_poses: Vec<Positions<'_>> = obstacle_poses.iter().map(Vec::as_slice).collect();
         let still_boxes = swept::swept_boxes(&obstacle_poses);
         let tree = obstacle.faces.sweep(&still_boxes, rules.reach);
-        if !swept::overlap(&swept::bounds_of_finite(&skin.touching, boxes), &tree.bounds) {
+        let caught = self.caught_by(index);
+        if caught.is_empty() && !swept::overlap(&swept::bounds_of_finite(&skin.touching, boxes), &tree.bounds) {
             return;
         }
         let between = poses_between(query, &times);
@@ -220,14 +231,13 @@ impl CollisionScene<'_> {
             skin,
             released,
             obstacle,
+            caught,
             boxes: [boxes, &still_boxes],
             body: MovingSurface { surface: &skin.surface, poses: &body_poses },
             still: MovingSurface { surface: &obstacle.surface, poses: &obstacle_poses },
             rules,
         };
-        meeting.particles(&tree, out);
-        meeting.points(faces, out);
-        meeting.edges(out);
+        act(&meeting, &tree);
     }
 }
 
@@ -250,6 +260,7 @@ struct SkinObstaclePair<'a> {
     skin: &'a BodySkin,
     released: &'a ReleasedElements,
     obstacle: &'a Obstacle,
+    caught: &'a [CaughtParticle],
     /// Swept boxes of the particles and of the obstacle's points.
     boxes: [&'a [Cuboid]; 2],
     body: MovingSurface<'a>,
@@ -290,14 +301,15 @@ impl SkinObstaclePair<'_> {
             for particle in particles.iter().filter(|particle| !self.released.has_particle(**particle)) {
                 tree.overlapping(&self.boxes[0][*particle as usize], &mut faces);
                 let own = &self.boxes[0][*particle as usize];
-                if faces.is_empty() && !(has_inside && swept::overlap(own, &bounds)) {
+                let entry = self.entry(*particle);
+                if faces.is_empty() && entry.is_none() && !(has_inside && swept::overlap(own, &bounds)) {
                     continue;
                 }
                 path_of(self.body.poses, *particle, &mut path);
                 let start = path[0];
                 hits.clear();
                 let closest_at_start = || self.closest_at_start(&solid, &bounds, start);
-                vertex::hits(&path, &self.still, &faces, &closest_at_start, &self.rules, &mut hits);
+                vertex::hits(&path, &self.still, (&faces, entry), &closest_at_start, &self.rules, &mut hits);
                 for hit in &hits {
                     let corners = self.obstacle.surface.triangles[hit.face as usize];
                     let first = ([*particle, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]);
@@ -337,7 +349,7 @@ impl SkinObstaclePair<'_> {
                 }
                 path_of(self.still.poses, *point, &mut path);
                 hits.clear();
-                vertex::hits(&path, &self.body, &faces, &|| None, &self.rules, &mut hits);
+                vertex::hits(&path, &self.body, (&faces, None), &|| None, &self.rules, &mut hits);
                 for hit in &hits {
                     let [a, b, c] = self.skin.surface.triangles[hit.face as usize];
                     let [u, v, w] = hit.weights;

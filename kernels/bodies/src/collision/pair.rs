@@ -128,7 +128,7 @@ impl Pair<'_> {
                 }
                 hits.clear();
                 let path = poses.map(|pose| DVec3::from(pose[*particle as usize]));
-                vertex::hits(&path, &on, &faces, &|| None, &self.rules, &mut hits);
+                vertex::hits(&path, &on, (&faces, None), &|| None, &self.rules, &mut hits);
                 for hit in &hits {
                     let [a, b, c] = second.surface.triangles[hit.face as usize];
                     let [u, v, w] = hit.weights;

@@ -62,13 +62,29 @@ pub(super) struct Hit {
     clearance: f64,
 }
 
+/// The first of `faces` through which a point on `path` enters a closed surface.
+pub(super) fn entered(path: &[DVec3], on: &MovingSurface<'_>, faces: &[u32]) -> Option<u32> {
+    let crossed = faces.iter().filter_map(|face| match crossing(path, on, *face, 0.0) {
+        Approach::Crosses(time, _) => Some((time, *face)),
+        _ => None,
+    });
+    crossed.reduce(|best, next| if next.0 < best.0 { next } else { best }).map(|(_, face)| face)
+}
+
+/// The point of a surface that keeps `point` out, for one that went in through `face`; `None` once it is out again on
+/// that side.
+pub(super) fn way_back(surface: &TriangleSurface, at: &Moment<'_>, face: u32, point: DVec3) -> Option<ClosestPoint> {
+    let nearest = surface.walk_to(at, face, point).nearest;
+    is_behind(surface, at, &nearest, point).then_some(nearest)
+}
+
 /// Adds the contacts of a point on `path`, which has a position for each pose, with `faces`, ascending.
 /// `closest_at_start` finds the closest triangle at the start, for a point that may start inside and has no triangle
-/// close to it.
+/// close to it. A point that went in through the triangle `entry` in an earlier step is kept out by what lies there.
 pub(super) fn hits(
     path: &[DVec3],
     on: &MovingSurface<'_>,
-    faces: &[u32],
+    (faces, entry): (&[u32], Option<u32>),
     closest_at_start: &dyn Fn() -> Option<ClosestPoint>,
     rules: &ContactRules,
     out: &mut Vec<Hit>,
@@ -81,6 +97,10 @@ pub(super) fn hits(
         let clearance = normal.dot(&(end - nearest.point)) + shift;
         Some(Hit { face: nearest.face, weights: nearest.weights, normal, shift, clearance })
     };
+    if let Some(back) = entry.and_then(|face| way_back(surface, &on.start(), face, path[0])) {
+        out.extend(plane(back.face, 1.0, (back.distance - PUSH * rules.gap).max(0.0)));
+        return;
+    }
     let mut met = (path.len() - 1) as f64;
     let mut through: Vec<(u32, f64)> = Vec::new();
     let mut near: Vec<u32> = Vec::new();

@@ -5,6 +5,7 @@ use numerics::random::Key;
 use numerics::shapes;
 
 mod bodies;
+mod caught;
 mod hand;
 mod overlap;
 mod soft;
