@@ -321,13 +321,17 @@ impl SolidShape<'_> {
     /// Marks the points that are `inside`, and raises `deepest` to the largest depth of a point below the gap. Of the
     /// first `particles` of them, those outside are left to contacts, which know how near they are.
     fn depths(&self, points: &[[f64; 3]], particles: usize, inside: &mut [bool], deepest: &mut f64) {
-        let all: Vec<u32> = (0..points.len() as u32).collect();
         let mut within = vec![false; points.len()];
         if self.surface.closed {
-            Enclosure::new(self.at, &self.surface.triangles, 0.0).mark(points, &all, &mut within);
+            let [low, high] = bounds(self.surface.vertices.iter().map(|vertex| self.at[*vertex as usize]));
+            let is_near = |p: &[f64; 3]| (0..3).all(|axis| low[axis] <= p[axis] && p[axis] <= high[axis]);
+            let near: Vec<u32> = (0..).zip(points).filter(|(_, p)| is_near(p)).map(|(point, _)| point).collect();
+            if !near.is_empty() {
+                Enclosure::new(self.at, &self.surface.triangles, 0.0).mark(points, &near, &mut within);
+            }
         }
         let measured = |point: &u32| within[*point as usize] || *point as usize >= particles;
-        let measured: Vec<u32> = all.into_iter().filter(measured).collect();
+        let measured: Vec<u32> = (0..points.len() as u32).filter(measured).collect();
         if measured.is_empty() {
             return;
         }
