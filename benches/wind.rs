@@ -42,7 +42,10 @@ struct Chain<'p> {
     collision: Option<&'p str>,
 }
 
-const FULL: Chain<'_> = Chain { name: "full chain", shielding: Some(""), turns: true, collision: Some("") };
+/// Without `loft`, as the paper: more curves meet the skin.
+const FULL: Chain<'_> = Chain { name: "full chain", shielding: Some(""), turns: true, collision: Some(NO_LOFT) };
+const LOFT: Chain<'_> = Chain { name: "full chain, default loft", collision: Some(""), ..FULL };
+const NO_LOFT: &str = r#""loft": 0"#;
 const STILL: Chain<'_> = Chain { name: "full chain, shielding still", turns: false, ..FULL };
 const SMOOTH: Chain<'_> =
     Chain { name: "no collision, shelter with smooth 0.5", shielding: Some(r#""smooth": 0.5, "#), ..NO_COLLISION };
@@ -63,7 +66,7 @@ fn main() {
     timing::print_machine(&two);
     let mut figures = Figures::default();
     let sphere = Fur::Sphere(10_000, 5);
-    let small = [FULL, STILL, NO_COLLISION, NO_COLLIDERS, SMOOTH].map(|chain| (chain, graph(chain, sphere, 24)));
+    let small = [FULL, LOFT, STILL, NO_COLLISION, NO_COLLIDERS, SMOOTH].map(|chain| (chain, graph(chain, sphere, 24)));
     let bear = graph(FULL, Fur::Bear, 24);
     let larger =
         [(100_000, 5), (10_000, 32)].map(|(curves, cvs)| (curves, cvs, graph(FULL, Fur::Sphere(curves, cvs), 6)));
@@ -120,7 +123,7 @@ fn tips(engine: &Engine, collision: Option<&str>) -> (Vec<[f32; 3]>, f64) {
 /// Error of tips ÷ length against exact first contact without a gap, for the curves that touch something.
 fn work_and_precision(engine: &Engine) {
     let (free, _) = tips(engine, None);
-    let (reference, _) = tips(engine, Some(r#""gap": 0"#));
+    let (reference, _) = tips(engine, Some(r#""loft": 0, "gap": 0"#));
     let far = |a: &[f32; 3], b: &[f32; 3]| (to_f64(*a) - to_f64(*b)).norm() / LENGTH;
     let met: Vec<usize> = (0..free.len()).filter(|k| far(&free[*k], &reference[*k]) > 1e-6).collect();
     println!(
@@ -133,13 +136,13 @@ fn work_and_precision(engine: &Engine) {
         errors.sort_by(f64::total_cmp);
         (errors.iter().sum::<f64>() / errors.len() as f64, errors[errors.len() * 99 / 100])
     };
-    let (found, exact) = tips(engine, Some(""));
+    let (found, exact) = tips(engine, Some(NO_LOFT));
     let (mean, most) = error(&found);
     println!("{:<12} {mean:>10.2e} {most:>10.2e} {exact:>9.2}", "exact");
     let mut before: Option<(f64, f64)> = None;
     let mut enough: [Option<f64>; 2] = [None; 2];
     for steps in [8, 32, 64, 128, 512, 2048, 8192] {
-        let params = format!(r#""gap": 0, "method": "steps", "rotation_steps": {steps}"#);
+        let params = format!(r#""loft": 0, "gap": 0, "method": "steps", "rotation_steps": {steps}"#);
         let (found, time) = tips(engine, Some(&params));
         let (mean, most) = error(&found);
         let slope = |(fewer, error): (f64, f64)| libm::log2(mean / error) / libm::log2(f64::from(steps) / fewer);

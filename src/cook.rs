@@ -91,7 +91,7 @@ const BYTES_PER_FRAME: usize = 128;
 pub fn run(args: &CookArgs) -> Result<(), Failure> {
     let format: Format = args.format.parse().map_err(|error| Failure::new(Exit::CommandLine, format!("{error}")))?;
     let ceiling = memory::ceiling(args.memory);
-    let engine = load::engine(usize::from(args.threads), ceiling)?;
+    let engine = load::engine(usize::from(args.threads), ceiling)?.comparing_samples(args.report.is_some());
     let graph = load::graph(&args.graph, &args.set)?.map_err(|faults| load::faulty(&args.graph, &faults))?;
     let request = Request {
         outputs: load::outputs(&graph, &args.outputs)?,

@@ -188,6 +188,7 @@ impl Bench {
     pub fn try_frames(&self, frames: &[Frame]) -> Result<Vec<BenchResult>, Arc<CookError>> {
         let graph = self.graph();
         let engine = Engine::new(&Settings { threads: self.threads, ..Settings::default() }).expect("threads");
+        let engine = engine.comparing_samples(true);
         let (found, report) = cook_all(&engine, &graph, frames);
         if let Some((_, error, _)) = report.errors.into_iter().next() {
             return Err(error);

@@ -10,16 +10,17 @@
 //!   passes through a thin collider, and cost does not grow with accuracy.
 //! * Turns stop `gap` of arc length short of contact, so that positions rounded to a file's f32 do not cross.
 //! * Neither W's collision nor the first contact is continuous in the wind. `coherence` redirects segments out of the
-//!   skin beforehand by a continuous map: on the bear, in wind that moves 0.50 % of all curves by more than a quarter
-//!   of their length in a frame, collision raises that to 1.07 %, and to 0.70 % at `coherence` 1
-//!   (tests/wind/coherence.rs).
+//!   skin by a continuous map, and lets them take a free direction however they get there: on the bear, in wind that moves
+//!   0.50 % of all curves by more than a quarter of their length in a frame, collision raises that to 1.07 %, and to
+//!   0.63 % at `coherence` 1 (tests/wind/coherence.rs); docs/wind.md has other bodies.
+//! * `loft`, by default, keeps a tenth of the height of what the wind presses down: first contact lays it on the skin.
 //! * A segment may be carried to where no turn about its CV frees it, which W leaves open. Then the whole curve is blended
 //!   towards rest, up to its first pose that crosses nothing.
 //! * `offset_scale` only raises segments that would lie lower: wind may lift fur off the skin.
 
 use std::sync::Arc;
 
-use curves::collide::{Collide, Collided, ContactMethod, at_rest, collide};
+use curves::collide::{Collide, ContactMethod, at_rest, collide};
 use engine::prelude::*;
 use numerics::tree::TriangleTree;
 
@@ -59,9 +60,9 @@ params! { PARAMS:
         "Minimum height above the skin, relative to the height at rest: 1 keeps the volume of the coat, smaller values \
          let the wind press it down. Negative values turn this off.")
         .soft(-1.0, 1.0);
-    LOFT: Param<f64> = Param::double("loft", 0.0,
+    LOFT: Param<f64> = Param::double("loft", 0.1,
         "Share of its height at rest, above the tangent plane of the skin at its root, that a CV keeps which the wind blows \
-         below it: a little keeps a coat from lying glued to the skin, and costs nothing. `coherence` scales it by \
+         below it: a little keeps a coat from lying glued to the skin, and saves time. `coherence` scales it by \
          1 − its own value. 0 is the paper's.")
         .within(0.0, 1.0).when(|params| params.get(OFFSET_SCALE) < 0.0 && params.get(COHERENCE) < 1.0);
     GAP: Param<f64> = Param::double("gap", 1e-4,
@@ -71,10 +72,13 @@ params! { PARAMS:
         "Diameter of the curves in collisions. At 0 they are infinitely thin.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     COHERENCE: Param<f64> = Param::double("coherence", 0.0,
-        "How strongly curves blown into the skin are redirected outward before collision, so that they do not flip \
-         from one side to the other as the wind turns: at 0 they are not redirected; at 1 there are \
-         hardly more jumps than in the wind itself. The more directly the wind blows into the skin, the more upright \
-         this keeps curves that would otherwise lie flat.")
+        "How strongly curves blown into the skin are redirected outward, so that they do not flip from one side to the \
+         other as wind and skin move. At 0 each segment stops at its first contact, which depends on all of its way: a \
+         few curves in a thousand jump in each frame. At 1 there are hardly more jumps than in the wind itself (see the \
+         metric `jumps`), few curves touch the skin, and tips move 1 to 3 % less; collision takes 1.7 times as long. The more \
+         directly the wind blows into the skin, the more upright curves stay that would otherwise lie flat. Above 0 a \
+         curve may end on the other side of a fold of the skin, but of no other collider; values between 0 and 1 leave \
+         part of the redirection, and of the jumps.")
         .within(0.0, 1.0);
     BLEND: Param<Maskable> = Param::maskable("blend", 1.0,
         "How much of each segment's collision response is applied: 0 leaves the curves as the wind bends them, 1 keeps \
@@ -84,6 +88,12 @@ params! { PARAMS:
 
 /// Number of a curve's segments that cross a collider.
 const UNFREED_SEGMENTS: Attr<i32> = Attr::element("unfreed");
+
+/// 1 for a curve that is blended towards rest.
+const BLENDED_CURVE: Attr<i32> = Attr::element("blended");
+
+/// 1 for a curve whose root is nearer to the skin than `offset_root`.
+const LOW_ROOT: Attr<i32> = Attr::element("low_root");
 
 const OUT: Output = Output::like("curves", &CURVES, "The curves, bent around the colliders. Lengths are kept.");
 
@@ -97,28 +107,39 @@ metrics! { METRICS:
     UNFREED = Metric::new("unfreed_segments", Unit::None,
         "Segments that cross a collider and that no turn can free, of curves that cross one at rest too.");
     BLENDED = Metric::new("blended_to_rest", Unit::None,
-        "Curves that turns alone did not free: they are blended towards rest up to their first pose without a crossing.");
+        "Curves that turns alone did not free: they are blended towards rest up to their first pose without a crossing.")
+        .warn_above(MANY, "So many curves are held back near their rest shape, because one of their segments would cross a \
+            collider however it turned; they may jump where that begins and ends. `blended` of the output says which. \
+            Raise `coherence`, or resample the curves to shorter segments where the skin has folds.");
     STARTED_INSIDE = Metric::new("started_inside", Unit::None, "Curves that cross a collider in their rest shape.")
         .warn_above(0.0, "These curves cross a collider before any wind blows, so there is no free position to start \
             from: they are turned outwards as far as possible. Clear them of the collider in their rest shape, raise \
             `offset_root`, or leave out that collider.");
     LOW_ROOTS = Metric::new("low_roots", Unit::None,
         "Roots in creases so narrow that a move of 4 times `offset_root` does not bring them that far from all faces. \
-         They are as far from them as such a move brings them.");
+         They are as far from them as such a move brings them.")
+        .warn_above(MANY, "So many roots lie in creases too narrow for `offset_root`: their curves begin nearer to the skin \
+            than that, and may touch it. `low_root` of the output says which. Lower `offset_root` (down to `gap`) until \
+            they fit, or move these curves out of the creases.");
     CONTACTS = Metric::new("contacts", Unit::None,
         "Segments stopped by a collider before they reach the direction that the wind gave them.");
     DEEPEST = Metric::new("deepest_overlap", Unit::Metres,
         "How far the deepest unfreed segment reaches through a surface.");
     LENGTH_ERROR = Metric::length_error();
+    JUMPS = Metric::jumps();
 }
+
+/// Number of curves from which a note is worth reading: a few in a groom of thousands are not seen.
+const MANY: f64 = 20.0;
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Collision",
-    4,
+    5,
     "Keeps curves that are bent by wind out of colliders. Each segment, root to tip, turns from its rest direction \
      towards the direction that the wind gave it, until it touches a collider. Place this node after the wind, and \
-     wire the curves from before the wind into `rest`. `unfreed` is the number of segments of each curve that still \
-     cross a collider.",
+     wire the curves from before the wind into `rest`. Of each curve, `unfreed` is the number of segments that still \
+     cross a collider, `blended` is 1 if it is held back near its rest shape, and `low_root` if its root is nearer to the \
+     skin than `offset_root`.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -132,7 +153,7 @@ pub(crate) static NODE: Node = Node::new(
 ])
 .outputs(&[&OUT])
 .reads(&[&P])
-.writes(&[&P, &UNFREED_SEGMENTS])
+.writes(&[&P, &UNFREED_SEGMENTS, &BLENDED_CURVE, &LOW_ROOT])
 .attributes(|params| group::attributes(params, GROUP))
 .metrics(METRICS)
 .neutral(|params, wires| match params {
@@ -140,7 +161,11 @@ pub(crate) static NODE: Node = Node::new(
     _ if params.get(BLEND).value == 0.0 => Some("`blend` is 0"),
     _ => None,
 })
-.neutral_fills(&[Fill::always_int(UNFREED_SEGMENTS, 0)])
+.neutral_fills(&[
+    Fill::always_int(UNFREED_SEGMENTS, 0),
+    Fill::always_int(BLENDED_CURVE, 0),
+    Fill::always_int(LOW_ROOT, 0),
+])
 .leaves_out(|params, _| {
     let mut left_out = Vec::new();
     if params.get(COHERENCE) == 0.0 {
@@ -165,36 +190,49 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         ))
         .hint("give `rest` the curves as they were before the wind nodes"));
     }
-    let (points, crossings) = match Group::of(&cx.get(GROUP), &curves)? {
-        None => {
-            let collided = collided(cx, &curves, rest)?;
-            (collided.points, collided.crossings)
-        }
+    let found = match Group::of(&cx.get(GROUP), &curves)? {
+        None => collided(cx, &curves, rest)?,
         Some(group) => collided_of(cx, &group, &curves, rest)?,
     };
-    curves.set(P, points)?;
-    if cx.wants(UNFREED_SEGMENTS) {
-        curves.set(UNFREED_SEGMENTS, crossings)?;
+    curves.set(P, found.points)?;
+    for (attr, values) in OF_CURVES.into_iter().zip(found.of_curves) {
+        if cx.wants(attr) {
+            curves.set(attr, values)?;
+        }
     }
     Ok(OUT.with(curves))
 }
 
-/// The curves of a group collided, the others as they are: points, and crossing segments of each curve.
-fn collided_of(cx: &Cx, group: &Group, curves: &Component, rest: &Component) -> Result<(Vec<[f32; 3]>, Vec<i32>)> {
+/// What is written of each curve.
+const OF_CURVES: [Attr<i32>; 3] = [UNFREED_SEGMENTS, BLENDED_CURVE, LOW_ROOT];
+
+/// Curves after collision.
+struct Found {
+    points: Vec<[f32; 3]>,
+    /// The values of [`OF_CURVES`].
+    of_curves: [Vec<i32>; 3],
+}
+
+/// The curves of a group collided; the others as they are, with 0 of everything.
+fn collided_of(cx: &Cx, group: &Group, curves: &Component, rest: &Component) -> Result<Found> {
     let chosen = group.curves(curves.runs());
     let part = taken(curves, &chosen)?;
     let part_of_rest = rest.kept(chosen.clone(), || taken(rest, &chosen))?;
-    let collided = collided(cx, &part, &part_of_rest)?;
-    let (mut points, mut crossings) = (curves.positions().to_vec(), vec![0; curves.element_count()]);
+    let part_found = collided(cx, &part, &part_of_rest)?;
+    let mut points = curves.positions().to_vec();
     for (curve, own) in chosen.iter().zip(part.runs().ranges()) {
-        points[curves.runs().range(*curve as usize)].copy_from_slice(&collided.points[own]);
+        points[curves.runs().range(*curve as usize)].copy_from_slice(&part_found.points[own]);
     }
-    chosen.iter().zip(collided.crossings).for_each(|(curve, count)| crossings[*curve as usize] = count);
-    Ok((points, crossings))
+    let of_curves = part_found.of_curves.map(|own| {
+        let mut all = vec![0; curves.element_count()];
+        chosen.iter().zip(own).for_each(|(curve, value)| all[*curve as usize] = value);
+        all
+    });
+    Ok(Found { points, of_curves })
 }
 
 /// Curves collided, and the metrics published.
-fn collided(cx: &Cx, curves: &Component, rest: &Component) -> Result<Collided> {
+fn collided(cx: &Cx, curves: &Component, rest: &Component) -> Result<Found> {
     let colliders = cx.part(COLLIDERS);
     let trees: Vec<Arc<TriangleTree>> = colliders.iter().map(|mesh| tree(mesh)).collect();
     let obstacles: Vec<&TriangleTree> = trees.iter().map(Arc::as_ref).collect();
@@ -232,7 +270,8 @@ fn collided(cx: &Cx, curves: &Component, rest: &Component) -> Result<Collided> {
     cx.publish(CONTACTS, collided.contacts as f64);
     cx.publish(DEEPEST, collided.deepest_overlap);
     cx.publish(LENGTH_ERROR, collided.length_error);
-    Ok(collided)
+    let low = at_rest.is_low().map(i32::from).collect();
+    Ok(Found { points: collided.points, of_curves: [collided.crossings, collided.blended, low] })
 }
 
 /// Everything that the test of rest curves depends on besides the curves; equal if the trees are the same objects.

@@ -29,7 +29,7 @@ fn distance(a: Vec3, b: Vec3) -> f32 {
 fn coherent_collision_adds_few_jumps_to_those_of_the_wind() {
     let collision = |name: &str, coherence: f32| {
         format!(
-            r#", "{name}": {{ "type": "Curve_Wind_Collision", "params": {{ "coherence": {coherence} }},
+            r#", "{name}": {{ "type": "Curve_Wind_Collision", "params": {{ "loft": 0, "coherence": {coherence} }},
                  "inputs": {{ "curves": "wind", "rest": "fur", "colliders": ["skin"] }} }}"#
         )
     };

@@ -81,6 +81,8 @@ pub struct Engine {
     ceiling: Ceiling,
     store: Mutex<Store>,
     files: Arc<Files>,
+    /// Whether results at consecutive samples are compared, for the report.
+    compares: bool,
     /// What a check of a graph has cooked already, for the report of the cook that follows.
     verified: Mutex<BTreeMap<ContentKey, NodeReport>>,
 }
@@ -99,7 +101,14 @@ impl Engine {
         let store = Mutex::new(Store::new(settings.memory / 2));
         let files = Arc::new(Files::within(settings.ceiling));
         let Settings { memory, ceiling, .. } = *settings;
-        Ok(Self { pool, memory, ceiling, store, files, verified: Mutex::default() })
+        Ok(Self { pool, memory, ceiling, store, files, compares: false, verified: Mutex::default() })
+    }
+
+    /// From now on, cooks compare results at consecutive samples, for metrics such as [`crate::node::Metric::jumps`].
+    #[must_use]
+    pub fn comparing_samples(mut self, compares: bool) -> Self {
+        self.compares = compares;
+        self
     }
 
     /// Plans a request on `graph`.
@@ -151,6 +160,7 @@ impl Engine {
             ceiling: self.ceiling,
             store: Mutex::new(Store::new(usize::MAX)),
             files: self.files.clone(),
+            compares: false,
             verified: Mutex::default(),
         };
         let mut nothing = |_: &[Delivered]| -> Result<(), std::convert::Infallible> { Ok(()) };

@@ -18,6 +18,8 @@ pub struct Metric {
     pub help: &'static str,
     /// Its value at frames where the node is neutral.
     pub neutral: f64,
+    /// Whether the engine computes it, from the node's curves at consecutive samples; see [`Metric::jumps`].
+    pub is_of_jumps: bool,
     /// When an artist is told about it.
     pub warning: Option<Warning>,
 }
@@ -60,7 +62,7 @@ impl Trouble {
 impl Metric {
     /// A metric, 0 where the node is neutral.
     pub const fn new(name: &'static str, unit: Unit, help: &'static str) -> Self {
-        Self { name, unit, help, neutral: 0.0, warning: None }
+        Self { name, unit, help, neutral: 0.0, is_of_jumps: false, warning: None }
     }
 
     /// The largest change of a segment's length, as a share of its curve's length: what every node that must not
@@ -71,6 +73,14 @@ impl Metric {
             Unit::None,
             "The largest change of a segment's length, as a share of the curve's length.",
         )
+    }
+
+    /// The share of curves whose tips jump. The engine computes it, and the node does not publish it.
+    pub const fn jumps() -> Self {
+        let help = "Share of curves whose tips move by more than a quarter of their length between consecutive samples of \
+            the request, in the report only; the first sample has none. With samples at eighths of a frame speed counts \
+            little, and jumps are left.";
+        Self { is_of_jumps: true, ..Self::new("jumps", Unit::None, help) }
     }
 
     /// Its value where the node is neutral.

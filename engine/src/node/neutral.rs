@@ -122,7 +122,7 @@ impl Node {
             }
             outputs = outputs.and(**output, geometry);
         }
-        for metric in self.metrics {
+        for metric in self.metrics.iter().filter(|metric| !metric.is_of_jumps) {
             cx.publish(**metric, metric.neutral);
         }
         Ok(outputs)

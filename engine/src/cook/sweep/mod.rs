@@ -6,6 +6,7 @@
 mod chains;
 mod demand;
 mod executor;
+mod jumps;
 mod metrics;
 mod nodes;
 mod notes;
@@ -34,6 +35,7 @@ use crate::plan::{ChainSegment, Integrals, Keys, Plan, Read};
 use crate::time::Frame;
 use demand::Lookahead;
 pub(super) use executor::Executor;
+use jumps::Jumps;
 use notes::{Observed, ZeroMasks};
 use results::OnDisk;
 
@@ -88,6 +90,7 @@ struct NodeRun<'p> {
     zero_masks: ZeroMasks,
     /// Metrics that were not finite at some frame.
     left_out_metrics: BTreeSet<&'static str>,
+    jumps: Jumps,
     report: NodeReport,
 }
 
@@ -131,6 +134,7 @@ impl<'p> NodeRun<'p> {
             held: None,
             zero_masks: ZeroMasks::new(),
             left_out_metrics: BTreeSet::new(),
+            jumps: Jumps::default(),
             report: NodeReport {
                 id: Some(node.id.clone()),
                 type_name: node.type_name(),
@@ -184,7 +188,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             .iter()
             .zip(&plan.nodes)
             .any(|(node, planned)| planned.needed && node.node().is_some_and(|declared| declared.cook.is_chain()));
-        let mut next = 0;
+        let (mut next, mut before) = (0, None);
         while let Some(first) = plan.request.frames.get(next) {
             let fits = |frame: &Frame| !chains || frame.ticks() - first.ticks() < MOST_CHAIN_FRAMES * Frame::TICKS;
             let frames = (next..next + self.slice_length()).map_while(|index| plan.request.frames.get(index));
@@ -192,6 +196,8 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             next += slice.len();
             let cooking = Stopwatch::start();
             let finished = self.slice(&slice);
+            self.compare_tips(before, &slice);
+            before = slice.last().copied();
             self.report.cooking += cooking.wall();
             if self.cancelled() {
                 self.report.cancelled = true;
@@ -209,6 +215,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         self.note_missing_attributes();
         self.note_empty_outputs();
         self.note_zero_masks();
+        self.report_jumps();
         self.note_warnings();
         let window = |(index, run): (usize, NodeRun<'_>)| NodeReport { window: self.keys.window(index), ..run.report };
         self.report.nodes = self.nodes.into_iter().enumerate().map(window).collect();
@@ -253,7 +260,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         let targets: Vec<Read> = reads.collect();
         self.warm_up_chains(&targets);
         let demand = self.collect_demand(&targets, &[], Lookahead::Whole);
-        let peak = self.cook_slice(demand, &targets);
+        let peak = self.cook_slice(demand, &targets, frames);
         if self.cancelled() {
             return finished;
         }
@@ -287,7 +294,11 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
                     Some((geometry, metrics)) => {
                         self.report.from_disk += 1;
                         self.publish_kept(*output, *frame, &metrics);
-                        saved.extend(plan.ancestors(plan.graph.outputs[*output].from.node));
+                        let from = plan.graph.outputs[*output].from;
+                        if from.port == 0 {
+                            self.record_tips_of(from.node, *frame, &geometry);
+                        }
+                        saved.extend(plan.ancestors(from.node));
                         finished.push(Delivered { output: *output, frame: *frame, geometry: Arc::new(geometry) });
                     }
                     None => missing.push((*output, *frame, key)),

@@ -22,8 +22,8 @@ use crate::time::Frame;
 const WORTH_A_THREAD: Duration = Duration::from_micros(20);
 
 impl<'g> Sweep<'_, 'g, '_> {
-    /// Cooks what a slice demands, node by node. Returns the greatest size of results held at once.
-    pub(super) fn cook_slice(&mut self, demand: Vec<NodeDemand<'g>>, targets: &[Read]) -> usize {
+    /// Cooks what a slice of these frames demands, node by node. Returns the greatest size of results held at once.
+    pub(super) fn cook_slice(&mut self, demand: Vec<NodeDemand<'g>>, targets: &[Read], frames: &[Frame]) -> usize {
         let plan = self.plan;
         let mut readers_left: Vec<usize> = (0..demand.len()).map(|node| plan.readers(node).count()).collect();
         for target in targets {
@@ -37,16 +37,17 @@ impl<'g> Sweep<'_, 'g, '_> {
             }
             if !demand.is_empty() {
                 let watch = Stopwatch::start();
-                let (frames, moved) = (demand.frames.clone(), demand.frames_moved());
+                let (cooked, moved) = (demand.frames.clone(), demand.frames_moved());
                 self.cook_node(node, demand);
-                self.record_masks(node, &frames);
+                self.record_masks(node, &cooked);
                 self.save_window_states(node, moved, watch.wall());
-                self.save_results(node, &frames, watch.wall());
+                self.save_results(node, &cooked, watch.wall());
                 let report = &mut self.nodes[node].report;
                 report.wall += watch.wall();
                 report.cpu += watch.cpu();
                 self.note_misread(node);
             }
+            self.record_tips(node, frames);
             self.keep(node);
             peak = peak.max(self.live_bytes);
             let held = self.live_bytes + self.engine.store(|store| store.bytes());

@@ -25,7 +25,7 @@ impl Sweep<'_, '_, '_> {
                 .collect();
             self.forget_results();
             let demand = self.collect_demand(&[], &warm_ups, Lookahead::Whole);
-            self.cook_slice(demand, &[]);
+            self.cook_slice(demand, &[], &[]);
             self.end_slice();
             if self.cancelled() {
                 return;

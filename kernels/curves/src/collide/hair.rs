@@ -1,10 +1,12 @@
 //! One curve, root to tip.
 
+use super::coherent_turn::WayOut;
 use super::crossing::{first_crossing, first_crossing_in};
 use super::half_space::HalfSpace;
 use super::segment_turn::{Nearby, Segment, Turned};
 use super::{Collide, Reached, perpendicular};
 use nalgebra::Quaternion;
+use numerics::tree::TriangleTree;
 use numerics::vector::{self, DQuat, DVec3, Vec3, to_f32, to_f64};
 
 /// Length, in gaps, at the start of the first segment that is not tested if the root may lie on the skin.
@@ -45,9 +47,14 @@ struct Carried {
 }
 
 impl Hair<'_> {
-    /// Collides the curve and writes the result.
+    /// Collides the curve and writes the result; `others` are the obstacles besides the skin.
     #[inline(always)]
-    pub(super) fn collide<'t>(&mut self, how: &Collide<'t>, scratch: &mut Scratch<'t>) -> Reached {
+    pub(super) fn collide<'t>(
+        &mut self,
+        how: &Collide<'t>,
+        others: &'t [&'t TriangleTree],
+        scratch: &mut Scratch<'t>,
+    ) -> Reached {
         let mut reached = Reached::default();
         self.out.copy_from_slice(self.goal);
         let cvs = self.goal.len();
@@ -73,10 +80,11 @@ impl Hair<'_> {
             }
             let wanted = along / along.norm();
             let rounding = 1.2e-7 * (f64::from(largest) + length);
-            let segment = self.segment(how, k, &wanted, [length, rounding], &mut carried);
+            let (segment, ground) = self.segment(how, k, &wanted, [length, rounding], &mut carried);
+            let way_out = ground.map(|(up, rest)| WayOut { up, rest, others });
             // Not if the skin redirects the segment, or if its goal was raised.
             let may_keep_goal = segment.to == wanted && goal[k + 1] == to_f64(self.goal[k + 1]);
-            let direction = self.turn(how, k, &segment, may_keep_goal, nearby, &mut reached);
+            let direction = self.turn(how, k, (&segment, way_out.as_ref()), may_keep_goal, nearby, &mut reached);
             carried.rotation = smallest_rotation(&segment.from, &direction, &carried.axis) * carried.rotation;
             carried.before = direction;
             directions.push(direction);
@@ -92,7 +100,8 @@ impl Hair<'_> {
         reached
     }
 
-    /// The segment from CV k, about to turn towards the unit vector `wanted`.
+    /// The segment from CV k, about to turn towards the unit vector `wanted`; with coherence, the
+    /// skin's normal under it and its direction at rest.
     #[inline(always)]
     fn segment(
         &self,
@@ -101,21 +110,19 @@ impl Hair<'_> {
         wanted: &DVec3,
         [length, rounding]: [f64; 2],
         carried: &mut Carried,
-    ) -> Segment {
+    ) -> (Segment, Option<(DVec3, DVec3)>) {
         let rest = to_f64(self.rest[k + 1]) - to_f64(self.rest[k]);
-        let from = if rest.norm() > 0.0 { carried.rotation * (rest / rest.norm()) } else { *wanted };
+        let rest = (rest.norm() > 0.0).then(|| rest / rest.norm());
+        let from = rest.map_or(*wanted, |rest| carried.rotation * rest);
         carried.axis = perpendicular(&from, &carried.axis);
         let axis = carried.axis;
         let pivot = to_f64(self.out[k]);
-        let (from, to) = match how.ground(&pivot, length) {
-            None => (from, *wanted),
-            Some(ground) => {
-                let led_out =
-                    [&from, wanted].map(|at| part_way(at, &ground.lead_out(&from, at, length), &axis, how.coherence));
-                (led_out[0], led_out[1])
-            }
-        };
-        Segment {
+        let (mut to, mut way_out) = (*wanted, None);
+        if let Some(ground) = how.ground(&pivot, length) {
+            to = part_way(wanted, &ground.lead_out(&from, wanted, length), &axis, how.coherence);
+            way_out = Some((ground.normal, rest.unwrap_or(*wanted)));
+        }
+        let segment = Segment {
             pivot,
             from,
             to,
@@ -126,7 +133,8 @@ impl Hair<'_> {
             gap: how.gap,
             inner: self.untested(how, k),
             rounding,
-        }
+        };
+        (segment, way_out)
     }
 
     /// Length at the start of the segment from CV k that is not tested.
@@ -141,23 +149,27 @@ impl Hair<'_> {
         &mut self,
         how: &Collide<'t>,
         k: usize,
-        segment: &Segment,
+        (segment, way_out): (&Segment, Option<&WayOut<'t>>),
         may_keep_goal: bool,
         nearby: &mut Nearby<'t>,
         reached: &mut Reached,
     ) -> DVec3 {
+        let turn = |segment: &Segment, nearby: &mut Nearby<'t>| match way_out {
+            None => segment.turn(how.method, how.obstacles, nearby),
+            Some(way_out) => segment.turn_coherently(how.method, way_out, how.obstacles, nearby),
+        };
         let mut turned = match self.half_space {
             Some(half_space) if half_space.frees(&(to_f64(self.rest[0]) + self.shift), segment) => {
                 Turned { direction: segment.to, met: false, clear: true }
             }
-            _ => segment.turn(how.method, how.obstacles, nearby),
+            _ => turn(segment, nearby),
         };
         let mut end = segment.end(&turned.direction);
         if !turned.met && may_keep_goal && self.out[k] == self.goal[k] {
             end = self.goal[k + 1];
         }
         if !turned.clear && first_crossing(nearby, segment.start(&turned.direction), end).is_some() {
-            turned = segment.turn_wary(how.method, how.obstacles, nearby);
+            turned = turn(&segment.wary(), nearby);
             end = segment.end(&turned.direction);
             if let Some(crossing) = first_crossing(nearby, segment.start(&turned.direction), end) {
                 reached.unfreed_segments += 1;
@@ -234,7 +246,8 @@ impl Hair<'_> {
     }
 
     /// The step to a goal CV, turned so that its end has a share of its rest height above the root's tangent plane; `None` if
-    /// it is that high.
+    /// it is that high. It is where the turn from rest to the goal passes that height: where a turn would meet a floor there.
+    /// Straight up from the goal its side would depend on nothing but rounding where the wind blows into the skin.
     #[inline(always)]
     fn lofted(&self, k: usize, before: &DVec3, step: &DVec3, share: f64) -> Option<DVec3> {
         let height = |at: &DVec3, root: Vec3| self.up.dot(&(at - to_f64(root)));
@@ -245,9 +258,14 @@ impl Hair<'_> {
             return None;
         }
         let rise = ((wanted - now) / length).clamp(-1.0, 1.0);
-        let level = (step - self.up * self.up.dot(step)).try_normalize(1e-9 * length);
-        let rest = || perpendicular(&self.up, &(to_f64(self.rest[k]) - to_f64(self.rest[k - 1])));
-        Some((level.unwrap_or_else(rest) * (1.0 - rise * rise).sqrt() + self.up * rise) * length)
+        let goal = step / length;
+        let rest = (to_f64(self.rest[k]) - to_f64(self.rest[k - 1])).try_normalize(0.0).unwrap_or(self.up);
+        if let Some(on_way) = lowest_on_way(&rest, &goal, &self.up, rise) {
+            return Some(on_way * length);
+        }
+        let level = (goal - self.up * self.up.dot(&goal)).try_normalize(1e-9);
+        let level = level.unwrap_or_else(|| perpendicular(&self.up, &rest));
+        Some((level * (1.0 - rise * rise).sqrt() + self.up * rise) * length)
     }
 
     /// Turns each segment back towards its goal by 1 − `blend`; returns whether any turned.
@@ -284,6 +302,19 @@ pub(super) fn part_way(from: &DVec3, to: &DVec3, axis: &DVec3, share: f64) -> DV
     let n = if sine > 1e-9 { turn / sine } else { *axis };
     let (sine, cosine) = libm::sincos(share * libm::atan2(sine, cosine));
     from * cosine + n.cross(from) * sine
+}
+
+/// Where the turn from one unit vector to another sinks below the slope `rise` along `up`; `None` if it starts below.
+fn lowest_on_way(from: &DVec3, to: &DVec3, up: &DVec3, rise: f64) -> Option<DVec3> {
+    let side = (to - from * from.dot(to)).try_normalize(1e-9)?;
+    let slopes = [up.dot(from), up.dot(&side)];
+    let most = (slopes[0] * slopes[0] + slopes[1] * slopes[1]).sqrt();
+    if slopes[0] < rise || most == 0.0 {
+        return None;
+    }
+    let angle = libm::atan2(slopes[1], slopes[0]) + libm::acos((rise / most).clamp(-1.0, 1.0));
+    let (sine, cosine) = libm::sincos(angle);
+    Some(from * cosine + side * sine)
 }
 
 /// The smallest rotation from one unit vector to another; about `axis` if they are opposite.

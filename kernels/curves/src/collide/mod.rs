@@ -10,6 +10,7 @@
 //! obstacles, not volumes, so a curve wholly inside a surface stays there.
 
 mod coherence;
+mod coherent_turn;
 mod crossing;
 mod hair;
 mod half_space;
@@ -73,11 +74,19 @@ pub struct Collide<'a> {
     pub width: Masked<'a, f32>,
 }
 
+/// Distance, in gaps, by which coherence keeps ends off the skin.
+const KEPT_GAPS: f64 = 2.0;
+
+/// The largest such distance, in lengths of a segment.
+const MOST_KEPT: f64 = 0.25;
+
 impl Collide<'_> {
-    /// The skin that a segment is to be redirected out of, if any.
+    /// The skin that a segment is to be redirected out of, if any; its end is kept off it by more than the gap.
     #[inline(always)]
     fn ground(&self, pivot: &DVec3, length: f64) -> Option<Ground> {
-        self.skin.as_ref().filter(|_| self.coherence > 0.0)?.ground(pivot, length)
+        let ground = self.skin.as_ref().filter(|_| self.coherence > 0.0)?.ground(pivot, length)?;
+        let kept = (KEPT_GAPS * self.gap).min(MOST_KEPT * length);
+        Some(Ground { height: ground.height - kept, ..ground })
     }
 }
 
@@ -93,6 +102,8 @@ pub struct Collided {
     pub crossings_left: u64,
     /// The same of each curve.
     pub crossings: Vec<i32>,
+    /// 1 for each curve blended towards rest, else 0.
+    pub blended: Vec<i32>,
     /// Curves blended towards rest because turns left a segment crossing something.
     pub blended_to_rest: u64,
     /// Curves that cross something at rest.
@@ -155,11 +166,13 @@ pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how:
             &computed
         }
     };
-    let known = Known { at_rest, half_spaces: at_rest.used(path, starts, rest, how) };
+    let is_skin = |tree: &&TriangleTree| how.skin.as_ref().is_some_and(|skin| std::ptr::eq(*tree, skin.tree));
+    let others: Vec<&TriangleTree> = how.obstacles.iter().filter(|tree| !is_skin(tree)).copied().collect();
+    let known = Known { at_rest, half_spaces: at_rest.used(path, starts, rest, how), others: &others };
     let curves = starts.len().saturating_sub(1);
-    let (mut points, mut crossings) = (vec![[0.0; 3]; goal.len()], vec![0; curves]);
+    let (mut points, mut crossings, mut blended) = (vec![[0.0; 3]; goal.len()], vec![0; curves], vec![0; curves]);
     let mut tasks = Vec::new();
-    let (mut left, mut left_crossings) = (&mut points[..], &mut crossings[..]);
+    let (mut left, mut left_crossings, mut left_blended) = (&mut points[..], &mut crossings[..], &mut blended[..]);
     let mut first = 0;
     while first < curves {
         let mut end = first;
@@ -167,9 +180,10 @@ pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how:
             end += 1;
         }
         let (out, rest) = left.split_at_mut((starts[end] - starts[first]) as usize);
-        let (crossings, rest_of_curves) = left_crossings.split_at_mut(end - first);
-        tasks.push((first..end, Written { points: out, crossings }));
-        (left, left_crossings, first) = (rest, rest_of_curves, end);
+        let (crossings, other_crossings) = left_crossings.split_at_mut(end - first);
+        let (blended, other_blended) = left_blended.split_at_mut(end - first);
+        tasks.push((first..end, Written { points: out, crossings, blended }));
+        (left, left_crossings, left_blended, first) = (rest, other_crossings, other_blended, end);
     }
     let reached =
         parallel::map(tasks, |_, (curves, out)| collide_task(path, curves, starts, [rest, goal], how, known, out));
@@ -177,6 +191,7 @@ pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how:
     Collided {
         points,
         crossings,
+        blended,
         started_inside: at_rest.inside(),
         low_roots: at_rest.low_roots(),
         unfreed_segments: reached.unfreed_segments,
@@ -194,12 +209,15 @@ struct Known<'a> {
     at_rest: &'a AtRest,
     /// One for each curve, or none.
     half_spaces: &'a [HalfSpace],
+    /// Obstacles besides the skin.
+    others: &'a [&'a TriangleTree],
 }
 
 /// Where a task writes.
 struct Written<'a> {
     points: &'a mut [Vec3],
     crossings: &'a mut [i32],
+    blended: &'a mut [i32],
 }
 
 kernel! {
@@ -219,13 +237,13 @@ fn task(
     starts: &[u32],
     [rest, goal]: [&[Vec3]; 2],
     how: &Collide<'_>,
-    Known { at_rest, half_spaces }: Known<'_>,
+    Known { at_rest, half_spaces, others }: Known<'_>,
     out: Written<'_>,
 ) -> Reached {
     let mut scratch = Scratch::default();
     let mut reached = Reached::default();
     let base = starts[curves.start] as usize;
-    for (curve, crossings) in curves.zip(out.crossings) {
+    for ((curve, crossings), blended) in curves.zip(out.crossings).zip(out.blended) {
         let cvs = starts[curve] as usize..starts[curve + 1] as usize;
         let mut hair = Hair {
             first: cvs.start,
@@ -236,8 +254,8 @@ fn task(
             goal: &goal[cvs.clone()],
             out: &mut out.points[cvs.start - base..cvs.end - base],
         };
-        let one = hair.collide(how, &mut scratch);
-        *crossings = one.crossings_left as i32;
+        let one = hair.collide(how, others, &mut scratch);
+        (*crossings, *blended) = (one.crossings_left as i32, one.blended_to_rest as i32);
         reached = reached.and(one);
     }
     reached

@@ -159,6 +159,11 @@ impl AtRest {
         found.iter().filter(|found| **found != HalfSpace::default()).count()
     }
 
+    /// Whether the root of each curve is nearer to the skin than the root offset.
+    pub fn is_low(&self) -> impl ExactSizeIterator<Item = bool> {
+        self.curves.iter().map(|curve| curve.low)
+    }
+
     /// Number of roots that are nearer to the skin than the root offset.
     pub(super) fn low_roots(&self) -> u64 {
         self.curves.iter().map(|curve| u64::from(curve.low)).sum()

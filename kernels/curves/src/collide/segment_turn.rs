@@ -55,7 +55,7 @@ impl Segment {
     pub(super) fn turn<'t>(
         &self,
         method: ContactMethod,
-        obstacles: &'t [&'t TriangleTree],
+        obstacles: &[&'t TriangleTree],
         nearby: &mut Nearby<'t>,
     ) -> Turned {
         match self.sweep(method, obstacles, nearby) {
@@ -70,19 +70,13 @@ impl Segment {
         }
     }
 
-    /// As [`Segment::turn`], for use after that ended in a crossing: obstacles are thickened by the rounding error.
-    #[inline(always)]
-    pub(super) fn turn_wary<'t>(
-        &self,
-        method: ContactMethod,
-        obstacles: &'t [&'t TriangleTree],
-        nearby: &mut Nearby<'t>,
-    ) -> Turned {
+    /// For use after a turn that ended in a crossing: obstacles are thickened by the rounding error.
+    pub(super) fn wary(&self) -> Self {
         Self { half: self.half + 8.0 * self.rounding, gap: self.gap + 8.0 * self.rounding, ..*self }
-            .turn(method, obstacles, nearby)
     }
 
-    fn sector(&self, from: DVec3, towards: DVec3) -> Sector {
+    /// The sector of a turn from one unit vector towards another.
+    pub(super) fn sector(&self, from: DVec3, towards: DVec3) -> Sector {
         let axis = from.cross(&towards);
         let sine = axis.norm();
         let n = if sine > 1e-9 { axis / sine } else { perpendicular(&from, &self.axis) };
@@ -99,7 +93,7 @@ impl Segment {
     }
 
     #[inline(always)]
-    fn sweep<'t>(&self, method: ContactMethod, obstacles: &'t [&'t TriangleTree], nearby: &mut Nearby<'t>) -> Sweep {
+    fn sweep<'t>(&self, method: ContactMethod, obstacles: &[&'t TriangleTree], nearby: &mut Nearby<'t>) -> Sweep {
         let sector = self.sector(self.from, self.to);
         let (low, high) = sector.bounds(&self.to);
         gather(obstacles, low, high, nearby);
@@ -155,7 +149,7 @@ impl Segment {
     fn turn_out<'t>(
         &self,
         method: ContactMethod,
-        obstacles: &'t [&'t TriangleTree],
+        obstacles: &[&'t TriangleTree],
         nearby: &mut Nearby<'t>,
     ) -> Option<DVec3> {
         let crossed = self.crosses(&self.from, nearby);
@@ -166,7 +160,7 @@ impl Segment {
         let (low, high) = sector.bounds(&-sector.u);
         gather(obstacles, low, high, nearby);
         let angle = match method {
-            ContactMethod::Exact => first_gap(&sector, nearby),
+            ContactMethod::Exact => first_gap(&sector, nearby, PI, |radius| 1.001 * sector.back / radius),
             ContactMethod::Steps(steps) => {
                 let at = |step: u32| PI * f64::from(step) / f64::from(steps);
                 (1..=steps).map(at).find(|angle| self.crosses(&sector.direction(*angle), nearby).is_none())
@@ -242,10 +236,11 @@ fn first_stop(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop {
     }
 }
 
-/// The first angle up to π at which nothing is within the arc kept from contacts.
+/// The first angle up to `most` at which nothing is within the angle `kept` from a contact at a radius.
 #[inline(always)]
-fn first_gap(sector: &Sector, nearby: &Nearby<'_>) -> Option<f64> {
-    let wedge = Wedge::new(sector, [-1.0, 0.0]);
+pub(super) fn first_gap(sector: &Sector, nearby: &Nearby<'_>, most: f64, kept: impl Fn(f64) -> f64) -> Option<f64> {
+    let (sine, cosine) = if most < PI { libm::sincos(most) } else { (0.0, -1.0) };
+    let wedge = Wedge::new(sector, [cosine, sine]);
     let mut taken: Vec<[f64; 2]> = Vec::new();
     for (block, lanes) in nearby {
         let mut lanes = lanes & wedge.may_meet(block);
@@ -253,8 +248,7 @@ fn first_gap(sector: &Sector, nearby: &Nearby<'_>) -> Option<f64> {
             let lane = lanes.trailing_zeros() as usize;
             lanes &= lanes - 1;
             sector.blocked_by(&corners(block, lane), |blocked| {
-                let arc = |radius: f64| 1.001 * sector.back / radius;
-                let [lo, hi] = [blocked.lo - arc(blocked.lo_radius), blocked.hi + arc(blocked.hi_radius)];
+                let [lo, hi] = [blocked.lo - kept(blocked.lo_radius), blocked.hi + kept(blocked.hi_radius)];
                 taken.push([lo, hi]);
                 taken.push([lo - std::f64::consts::TAU, hi - std::f64::consts::TAU]);
             });
@@ -270,7 +264,7 @@ fn first_gap(sector: &Sector, nearby: &Nearby<'_>) -> Option<f64> {
             angle = hi;
         }
     }
-    (angle <= PI).then_some(angle)
+    (angle <= most).then_some(angle)
 }
 
 impl Blocked {
@@ -282,12 +276,12 @@ impl Blocked {
 
 impl Sector {
     /// The angle of the unit vector `to` in its plane: 0…π.
-    fn angle_of(&self, to: &DVec3) -> f64 {
+    pub(super) fn angle_of(&self, to: &DVec3) -> f64 {
         libm::atan2(self.u.cross(to).norm(), self.u.dot(to))
     }
 
     /// Bounds of everything it sweeps while it turns to the unit vector `end` in its plane.
-    fn bounds(&self, end: &DVec3) -> (Vec3, Vec3) {
+    pub(super) fn bounds(&self, end: &DVec3) -> (Vec3, Vec3) {
         let (sine, cosine) = (end.dot(&self.v), end.dot(&self.u));
         let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
         for axis in 0..3 {

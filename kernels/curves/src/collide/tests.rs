@@ -5,6 +5,7 @@ use super::*;
 use numerics::random::Key;
 use numerics::vector::{self, to_f64};
 
+mod coherent;
 mod freed;
 mod hairs;
 pub(super) mod kept;

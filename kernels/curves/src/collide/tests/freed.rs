@@ -3,6 +3,7 @@
 use super::hair::Hair;
 use super::kept::{Fur, bodies, burr};
 use super::*;
+use numerics::vector::to_f32;
 
 /// The number of segments of each curve that cross the mesh.
 fn crossings_of_each(fur: &Fur, points: &[Vec3]) -> Vec<i32> {
@@ -21,6 +22,16 @@ fn crossings_of_each(fur: &Fur, points: &[Vec3]) -> Vec<i32> {
     fur.starts.windows(2).map(count).collect()
 }
 
+/// Whether each curve, its root lifted, crosses nothing at rest.
+fn free_where_lifted(fur: &Fur, kept: &AtRest) -> Vec<bool> {
+    let lifted = |(curve, ends): (usize, &[u32])| {
+        let cvs = fur.rest[ends[0] as usize..ends[1] as usize].iter();
+        cvs.map(|cv| to_f32(to_f64(*cv) + kept.shift(curve))).collect::<Vec<_>>()
+    };
+    let lifted: Vec<Vec3> = fur.starts.windows(2).enumerate().flat_map(lifted).collect();
+    crossings_of_each(fur, &lifted).iter().map(|count| *count == 0).collect()
+}
+
 #[test]
 fn what_is_free_at_rest_is_free_in_any_wind() {
     let mut blended = 0;
@@ -29,16 +40,22 @@ fn what_is_free_at_rest_is_free_in_any_wind() {
         let fur = fur.raised(1e-3);
         let tree = TriangleTree::build(&fur.mesh.0, &fur.mesh.1);
         let obstacles = [&tree];
-        let free: Vec<bool> = crossings_of_each(&fur, &fur.rest).iter().map(|count| *count == 0).collect();
-        assert!(free.iter().filter(|free| **free).count() > free.len() / 4, "{name}");
-        for method in [ContactMethod::Exact, ContactMethod::Steps(8)] {
-            let out = collide(&fur.starts, &fur.rest, &fur.goal, &Collide { method, ..hairs::on(&obstacles) });
+        let normals = normals(&fur.mesh.0, &fur.mesh.1);
+        let skin = Some(SkinSurface { tree: &tree, triangles: &fur.mesh.1, normals: &normals });
+        let settings = [(ContactMethod::Exact, 0.0), (ContactMethod::Steps(8), 0.0), (ContactMethod::Exact, 1.0)];
+        for (method, coherence) in settings {
+            let skin = skin.filter(|_| coherence > 0.0);
+            let how = Collide { method, skin, coherence, ..hairs::on(&obstacles) };
+            let out = collide(&fur.starts, &fur.rest, &fur.goal, &how);
             let crossings = crossings_of_each(&fur, &out.points);
+            let free = free_where_lifted(&fur, &at_rest(&fur.starts, &fur.rest, &how));
+            assert!(free.iter().filter(|free| **free).count() > free.len() / 4, "{name}");
             for curve in 0..free.len() {
                 assert!(crossings[curve] <= out.crossings[curve], "{name}, {method:?}, {curve}");
                 assert!(!free[curve] || out.crossings[curve] == 0, "{name}, {method:?}, {curve}");
             }
             let sum: u64 = out.crossings.iter().map(|count| *count as u64).sum();
+            assert_eq!(out.blended.iter().map(|blended| *blended as u64).sum::<u64>(), out.blended_to_rest, "{name}");
             assert_eq!((sum, out.unfreed_segments), (out.crossings_left, out.crossings_left), "{name}");
             let lengths = hairs::worst_length(&fur.starts, &fur.goal, &out.points);
             assert!(lengths < 2e-6 && out.length_error < 2e-6, "{name}: {lengths}");

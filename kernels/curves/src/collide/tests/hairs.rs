@@ -29,7 +29,7 @@ pub(super) fn floor() -> (Vec<Vec3>, Vec<[u32; 3]>) {
 }
 
 /// A sphere of radius 1 about the origin, by rows of quads.
-fn sphere(rows: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+pub(super) fn sphere(rows: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
     let columns = 2 * rows;
     let mut points = vec![[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]];
     for row in 1..rows {
@@ -61,7 +61,7 @@ fn sphere(rows: u32) -> (Vec<Vec3>, Vec<[u32; 3]>) {
 
 /// Upright fur on the unit sphere, and its shape in a wind along `wind`: each segment turned by half of the remaining
 /// angle.
-fn fur(curves: u64, cvs: usize, long: f64, wind: DVec3) -> (Vec<u32>, Vec<Vec3>, Vec<Vec3>) {
+pub(super) fn fur(curves: u64, cvs: usize, long: f64, wind: DVec3) -> (Vec<u32>, Vec<Vec3>, Vec<Vec3>) {
     let (mut rest, mut goal) = (Vec::new(), Vec::new());
     for k in 0..curves {
         let up = random_unit(Key::new(5).of(k));

@@ -1,0 +1,146 @@
+//! How many curves jump from sample to sample after collision, by `coherence`, on four bodies: a camel with thin legs,
+//! the same with deep folds, a trefoil knot and a sphere. The tables of docs/wind.md.
+//!
+//! `cargo run --release -p studies --bin coherence_study [camel|folds|knot|sphere]… [still|moving|eighths|storm]…
+//! [coherence=X]… [curves=N] [pairs=N]`. 10,000 curves of 7 CVs; wind turns by 1° a frame. Each row compares `pairs` pairs
+//! of samples: a frame apart (still, moving), an eighth of one (eighths) or a quarter (storm). Jumps are tips that move by
+//! more than a quarter of their length; those are added whose curves do not jump in the wind alone.
+
+mod bodies;
+mod scene;
+
+use bodies::Body;
+use curves::collide::{Collide, Collided, ContactMethod, SkinSurface, collide};
+use numerics::vector::{Vec3, length, sub};
+use scene::{CVS, Case, Groom, Sample};
+
+/// Frames over which pairs are spread: a turn of the wind.
+const FRAMES: f64 = 360.0;
+
+/// A jump is a way of a tip longer than this share of its length.
+const JUMP: f64 = 0.25;
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let numbers =
+        |name: &str| -> Vec<f64> { words.iter().filter_map(|word| word.strip_prefix(name)?.parse().ok()).collect() };
+    let number = |name: &str, default: f64| numbers(name).first().copied().unwrap_or(default);
+    let asked = |all: [&'static str; 4]| -> Vec<&'static str> {
+        let named: Vec<_> = all.into_iter().filter(|name| words.iter().any(|word| word == name)).collect();
+        if named.is_empty() { all.to_vec() } else { named }
+    };
+    let (curves, pairs) = (number("curves=", 10_000.0) as usize, number("pairs=", 36.0) as usize);
+    let mut coherences = numbers("coherence=");
+    if coherences.is_empty() {
+        coherences = vec![0.0, 1.0];
+    }
+    println!(
+        "body    case    coherence  jumps %   wind's %  added %  p99.9 of way/L  contacts  crossings  to rest  way of tips/L"
+    );
+    for body in asked(["camel", "folds", "knot", "sphere"]) {
+        let groom = Groom::on(Body::named(body), curves);
+        for name in asked(["still", "moving", "eighths", "storm"]) {
+            let (case, step) = match name {
+                "still" => (Case::Still, 1.0),
+                "moving" => (Case::Moving, 1.0),
+                "eighths" => (Case::Moving, 0.125),
+                _ => (Case::Storm, 0.25),
+            };
+            let mut sums = vec![Sums::default(); coherences.len()];
+            let mut wind = Vec::new();
+            for pair in 0..pairs {
+                let frame = FRAMES * pair as f64 / pairs as f64;
+                let samples = [0.0, step].map(|step| groom.at(case, frame + step));
+                let blown = ways(&groom, &samples[0].goal, &samples[1].goal);
+                for (coherence, sums) in coherences.iter().zip(&mut sums) {
+                    let [before, after] = [&samples[0], &samples[1]].map(|sample| collided(&groom, sample, *coherence));
+                    sums.add(&groom, &samples[0], [&before, &after], &blown);
+                }
+                wind.extend(blown);
+            }
+            for (coherence, sums) in coherences.iter().zip(sums) {
+                println!("{body:7} {name:7} {coherence:9} {}", sums.row(&wind));
+            }
+        }
+    }
+}
+
+fn collided(groom: &Groom, sample: &Sample, coherence: f64) -> Collided {
+    let how = Collide {
+        obstacles: &[&sample.tree],
+        skin: Some(SkinSurface { tree: &sample.tree, triangles: &groom.body.triangles, normals: &sample.normals }),
+        method: ContactMethod::Exact,
+        gap: 1e-4,
+        offset_root: 1e-4,
+        offset_scale: None,
+        loft: 0.0,
+        coherence,
+        at_rest: None,
+        blend: 1.0.into(),
+        width: 0.0.into(),
+    };
+    collide(&groom.starts, &sample.rest, &sample.goal, &how)
+}
+
+/// What pairs of samples add up to.
+#[derive(Clone, Default)]
+struct Sums {
+    /// How far each tip moved, in lengths.
+    ways: Vec<f64>,
+    /// Jumps of curves that did not jump in the wind alone.
+    added: usize,
+    /// The sum of the tips' distances from rest, in lengths.
+    from_rest: f64,
+    samples: f64,
+    contacts: u64,
+    crossings: u64,
+    blended: u64,
+}
+
+impl Sums {
+    fn add(&mut self, groom: &Groom, at: &Sample, [before, after]: [&Collided; 2], blown: &[f64]) {
+        let moved = ways(groom, &before.points, &after.points);
+        self.added += moved.iter().zip(blown).filter(|(way, blown)| **way > JUMP && **blown <= JUMP).count();
+        self.ways.extend(moved);
+        self.from_rest += ways(groom, &at.rest, &before.points).iter().sum::<f64>();
+        self.samples += 1.0;
+        self.contacts += before.contacts;
+        self.crossings += before.crossings_left;
+        self.blended += before.blended_to_rest;
+    }
+
+    fn row(mut self, wind: &[f64]) -> String {
+        self.ways.sort_by(f64::total_cmp);
+        let high = self.ways.get(self.ways.len() * 999 / 1000).copied().unwrap_or(0.0);
+        let each = |sum: u64| sum as f64 / self.samples;
+        let from_rest = self.from_rest / self.ways.len() as f64;
+        format!(
+            "{:8.4} {:9.4} {:8.4} {high:15.3} {:10.0} {:10.2} {:8.1} {from_rest:13.4}",
+            jumps(&self.ways),
+            jumps(wind),
+            100.0 * self.added as f64 / self.ways.len() as f64,
+            each(self.contacts),
+            each(self.crossings),
+            each(self.blended),
+        )
+    }
+}
+
+/// Share of ways above a quarter of the length, in percent.
+fn jumps(ways: &[f64]) -> f64 {
+    100.0 * ways.iter().filter(|way| **way > JUMP).count() as f64 / ways.len() as f64
+}
+
+/// How far each tip moved, in lengths of its curve.
+fn ways(groom: &Groom, before: &[Vec3], after: &[Vec3]) -> Vec<f64> {
+    let distance = |a: Vec3, b: Vec3| f64::from(length(sub(a, b)));
+    let way = |ends: &[u32]| {
+        let cvs = ends[0] as usize..ends[1] as usize;
+        assert_eq!(cvs.len(), CVS, "curves of other CVs");
+        let long: f64 = after[cvs.clone()].windows(2).map(|pair| distance(pair[0], pair[1])).sum();
+        // Seen from the root, so that the speed of the skin does not count.
+        let [before, after] = [before, after].map(|points| sub(points[cvs.end - 1], points[cvs.start]));
+        distance(before, after) / long
+    };
+    groom.starts.windows(2).map(way).collect()
+}
