@@ -164,7 +164,7 @@ fn outside_a_group_curves_keep_their_bits() {
     let rest = goal.map(|[root, _]| [root, [root[0], 1.5, root[2]]]);
     let cook = |name: &str, rows: [i32; 2]| {
         let bench = bench(&NODE).input(CURVES, two(goal, rows)).input(REST, two(rest, [1, 1]));
-        bench.input(COLLIDERS, floor(0.0)).set(GROUP, name.into()).cook()
+        bench.input(COLLIDERS, floor(0.0)).set(GROUP, name.into()).set(LOFT, 0.0).cook()
     };
     let all = cook("", [0, 0]);
     for rows in [[0, 1], [2, 0], [0, 0], [1, 1]] {

@@ -272,7 +272,8 @@ impl Pieces {
                     return [at as u32];
                 }
                 for (by, inverse_length) in &AROUND {
-                    let beside = [cell[0] + by[0], cell[1] + by[1], cell[2] + by[2]];
+                    let mut beside = cell;
+                    (0..3).for_each(|axis| beside[axis] += by[axis]);
                     let Some(beside_at) = finder.find(beside) else { continue };
                     let slope = (view.phi[beside_at] - view.phi[at]) * inverse_length;
                     if slope < steepest && contains(view, beside) {
@@ -291,9 +292,9 @@ const AROUND: [([i32; 3], f32); 26] = {
     let (mut around, mut n, mut count) = ([([0; 3], 1.0); 26], 0, 0);
     while n < 27 {
         let by = [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1];
-        let axes = by[0] * by[0] + by[1] * by[1] + by[2] * by[2];
+        let axes = (by[0] != 0) as usize + (by[1] != 0) as usize + (by[2] != 0) as usize;
         if axes > 0 {
-            around[count] = (by, [0.0, 1.0, FRAC_1_SQRT_2, 0.577_350_26][axes as usize]);
+            around[count] = (by, [0.0, 1.0, FRAC_1_SQRT_2, 0.577_350_26][axes]);
             count += 1;
         }
         n += 1;
