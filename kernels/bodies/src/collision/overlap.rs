@@ -395,8 +395,12 @@ impl Ways {
 /// Points, with those of a surface moved below it by a distance.
 fn below(points: &[[f64; 3]], surface: &TriangleSurface, distance: f64) -> Vec<[f64; 3]> {
     let (at, mut below) = (Moment::of(points), points.to_vec());
+    let mut is_moved = vec![false; points.len()];
     for (corners, face) in surface.triangles.iter().zip(0..) {
         for (k, corner) in corners.iter().enumerate() {
+            if std::mem::replace(&mut is_moved[*corner as usize], true) {
+                continue;
+            }
             let point = at.position(*corner);
             let weights = std::array::from_fn(|other| if other == k { 1.0 } else { 0.0 });
             let outward = surface.outward(&at, &ClosestPoint { face, weights, point, distance: 0.0 });
