@@ -125,7 +125,11 @@ fn surface<'a>(body: &'a Component, along: Option<&Component>, shape: &Component
             format!("`shape` has {} points, the surface of `body` {held}", shape.point_count())
         }
         _ if held == 0 && body.point_count() > 0 => {
-            format!("`{name}` of `body` is below 0 everywhere: it has no surface")
+            let fact = format!("`{name}` of `body` is below 0 everywhere: no point of its surface is one of its own");
+            return Err(Error::refused(fact).hint(
+                "goals need a body whose surface is its own: from Tetrahedralize with `method` \"delaunay\" and nothing wired \
+                 into `carry`",
+            ));
         }
         _ => return Ok(rows),
     };

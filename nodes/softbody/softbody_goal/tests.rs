@@ -135,7 +135,7 @@ fn a_body_without_a_valid_surface_point_is_refused() {
     });
     assert_eq!(numbers, "`body` needs `surface_point`, which is one float for each point");
     let none = with(|tets| tets.edit(SURFACE_POINT).unwrap().fill(-1));
-    assert_eq!(none, "`surface_point` of `body` is below 0 everywhere: it has no surface");
+    assert_eq!(none, "`surface_point` of `body` is below 0 everywhere: no point of its surface is one of its own");
     let far = with(|tets| tets.edit(SURFACE_POINT).unwrap()[0] = 7000);
     assert!(far.starts_with("`surface_point` of `body` goes up to 7000, but its surface has "));
 }
