@@ -241,18 +241,47 @@ fn length_error(made: &Component, fur: &Component) -> f64 {
 /// Segments that pass through a triangle: their ends are on opposite sides of it, and they pass all three edges on the
 /// same side; in f64.
 fn crossings(curves: &Component, mesh: &Component) -> usize {
-    let corners = |triangle: &[u32; 3]| triangle.map(|corner| to_f64(mesh.positions()[corner as usize]));
-    let triangles: Vec<[DVec3; 3]> = mesh.triangles().corners.iter().map(corners).collect();
-    let crosses = |a: DVec3, b: DVec3, triangle: &[DVec3; 3]| {
-        let [p, q, r] = triangle.map(|corner| corner - a);
-        let along = b - a;
-        let normal = (q - p).cross(&(r - p));
-        let (start, end) = (-normal.dot(&p), normal.dot(&(along - p)));
-        let volumes = [along.dot(&p.cross(&q)), along.dot(&q.cross(&r)), along.dot(&r.cross(&p))];
-        start * end < 0.0 && (volumes.iter().all(|x| *x > 0.0) || volumes.iter().all(|x| *x < 0.0))
-    };
+    let corners = |triangle: &[u32; 3]| triangle.map(|corner| mesh.positions()[corner as usize]);
+    let triangles: Vec<[Point; 3]> = mesh.triangles().corners.iter().map(corners).collect();
+    let bounds: Vec<[Point; 2]> = triangles.iter().map(|triangle| bounds_of(triangle)).collect();
     let segments = curves.runs().ranges().flat_map(|cvs| curves.positions()[cvs].windows(2));
-    segments.filter(|ends| triangles.iter().any(|triangle| crosses(to_f64(ends[0]), to_f64(ends[1]), triangle))).count()
+    let passes_any = |ends: &&[Point]| {
+        let around = bounds_of(ends);
+        let mut near = triangles.iter().zip(&bounds).filter(|(_, bounds)| overlap(&around, bounds));
+        near.any(|(triangle, _)| crosses(to_f64(ends[0]), to_f64(ends[1]), &triangle.map(to_f64)))
+    };
+    segments.filter(passes_any).count()
+}
+
+/// The least and the greatest coordinates.
+fn bounds_of(points: &[Point]) -> [Point; 2] {
+    let mut bounds = [points[0]; 2];
+    for p in points {
+        for axis in 0..3 {
+            bounds[0][axis] = bounds[0][axis].min(p[axis]);
+            bounds[1][axis] = bounds[1][axis].max(p[axis]);
+        }
+    }
+    bounds
+}
+
+/// Compared one by one: these are most of the work, and tests are not optimised.
+fn overlap([from, to]: &[Point; 2], [least, most]: &[Point; 2]) -> bool {
+    from[0] <= most[0]
+        && to[0] >= least[0]
+        && from[1] <= most[1]
+        && to[1] >= least[1]
+        && from[2] <= most[2]
+        && to[2] >= least[2]
+}
+
+fn crosses(a: DVec3, b: DVec3, triangle: &[DVec3; 3]) -> bool {
+    let [p, q, r] = triangle.map(|corner| corner - a);
+    let along = b - a;
+    let normal = (q - p).cross(&(r - p));
+    let (start, end) = (-normal.dot(&p), normal.dot(&(along - p)));
+    let volumes = [along.dot(&p.cross(&q)), along.dot(&q.cross(&r)), along.dot(&r.cross(&p))];
+    start * end < 0.0 && (volumes.iter().all(|x| *x > 0.0) || volumes.iter().all(|x| *x < 0.0))
 }
 
 /// Curves from lists of CVs.
