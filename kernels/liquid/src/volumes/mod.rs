@@ -19,6 +19,7 @@
 mod follow;
 mod phases;
 mod pieces;
+mod thick;
 #[cfg(test)]
 mod tests;
 
@@ -35,6 +36,7 @@ use crate::step::Surface;
 use follow::marked;
 use phases::{Ways, ways_of_phases};
 use pieces::{Measured, Pieces};
+use thick::Area;
 
 /// Error of a piece's volume ÷ its target up to which its surface stays.
 pub const LEAST_ERROR: f64 = 1e-5;
@@ -428,20 +430,23 @@ impl VolumeTargets {
         let count = found.phases.count();
         let of_piece = |n: usize| {
             let (piece, targets) = (&found.all[n], &self.pieces[n]);
-            let (target, per_way) = (targets.volume() / unit, responses[n] * piece.area);
+            let target = targets.volume() / unit;
             let error = target - piece.volume;
-            if error.abs() <= LEAST_ERROR * target || piece.area <= 0.0 {
-                return vec![0.0; count];
+            if error.abs() <= LEAST_ERROR * target || piece.area.all <= 0.0 {
+                return (vec![0.0; count], 1.0);
             }
+            let least = piece.area.least(error.abs() / (responses[n] * cap));
+            let per_way = |area: Area| responses[n] * area.moved(least);
             if count == 1 {
-                return vec![(error / per_way).clamp(-cap, cap)];
+                return (vec![(error / per_way(piece.area)).clamp(-cap, cap)], least);
             }
             let lack = |phase| (targets.of_phase(phase) / unit - found.volume_of(n, phase)) * error.signum();
             let lacks: Vec<f64> = (0..count).map(|phase| lack(phase).max(0.0)).collect();
-            let areas: Vec<f64> = (0..count).map(|phase| responses[n] * found.phases.area(n, phase, 0.0)).collect();
-            ways_of_phases(error, &lacks, &areas, cap)
+            let areas: Vec<f64> = (0..count).map(|phase| per_way(found.phases.area(n, phase, piece.area))).collect();
+            (ways_of_phases(error, &lacks, &areas, cap), least)
         };
-        Ways { count, all: (0..found.all.len()).flat_map(of_piece).collect() }
+        let (all, least): (Vec<_>, Vec<_>) = (0..found.all.len()).map(of_piece).unzip();
+        Ways { count, all: all.concat(), least }
     }
 }
 
