@@ -1,8 +1,9 @@
 //! Cost and error of soft bodies: `cargo bench --bench softbody`, or `-- 2k` for that size only.
 //!
 //! The Softbody node on a block of dough that hangs by one end, rests on the ground, does so at a thousand times the
-//! stiffness, or is rolled over by a pin that moves ten thicknesses a frame; and on the beam that other solvers were
-//! measured on, alone and with such a pin. With and without volume preservation. The first frames in order, without
+//! stiffness, or is rolled over by a pin that moves ten thicknesses a frame; on the beam that other solvers were
+//! measured on, alone and with such a pin; and on a plastic lump under a pin that rolls across all of it, with friction
+//! and without. With and without volume preservation, the lump with. The first frames in order, without
 //! the cost of the start; no cache, no files, no self-collision. Errors are relative to sixteen accurate steps a
 //! frame, over few frames only: soft dough hanging by one end folds, and after a dozen frames thirty-two steps no
 //! longer agree with sixteen. Memory is that of a separate process.
@@ -45,21 +46,24 @@ struct Size {
     frames: i64,
     /// Whether to measure a single thread too.
     alone: bool,
+    /// Whether to measure the lump, which has one resolution.
+    lump: bool,
     /// Scenes for which sixteen steps a frame are affordable.
     exact: &'static [Scene],
 }
 
 const SIZES: [Size; 3] = [
-    Size { name: "2k", dough: [24, 6, 12], beam: [32, 8, 8], frames: 8, alone: true, exact: &Scene::ALL },
+    Size { name: "2k", dough: [24, 6, 12], beam: [32, 8, 8], frames: 8, alone: true, lump: false, exact: &Scene::ALL },
     Size {
         name: "20k",
         dough: [52, 13, 26],
         beam: [70, 17, 17],
         frames: 6,
         alone: true,
+        lump: true,
         exact: &[Scene::Beam, Scene::Free, Scene::Resting],
     },
-    Size { name: "100k", dough: [92, 23, 46], beam: [96, 24, 24], frames: 3, alone: false, exact: &[] },
+    Size { name: "100k", dough: [92, 23, 46], beam: [96, 24, 24], frames: 3, alone: false, lump: false, exact: &[] },
 ];
 
 /// A scene.
@@ -74,10 +78,24 @@ enum Scene {
     Resting,
     Stiff,
     Rolling,
+    /// A lump of 17.6k tets under a pin that rolls across all of it, with a coefficient of friction of 1, and of 0.
+    RolledLump,
+    SlippedLump,
 }
 
 impl Scene {
+    /// Those at all resolutions.
     const ALL: [Self; 6] = [Self::Beam, Self::RolledBeam, Self::Free, Self::Resting, Self::Stiff, Self::Rolling];
+    const LUMPS: [Self; 2] = [Self::RolledLump, Self::SlippedLump];
+
+    fn is_lump(self) -> bool {
+        Self::LUMPS.contains(&self)
+    }
+
+    /// Number of frames to measure: for the lump, until the pin is across.
+    fn frames(self, size: &Size) -> i64 {
+        if self.is_lump() { 23 } else { size.frames }
+    }
 
     fn name(self) -> &'static str {
         match self {
@@ -87,6 +105,8 @@ impl Scene {
             Self::Resting => "resting",
             Self::Stiff => "stiff",
             Self::Rolling => "rolling",
+            Self::RolledLump => "rolled lump",
+            Self::SlippedLump => "lump without friction",
         }
     }
 
@@ -94,6 +114,7 @@ impl Scene {
     fn sides(self) -> [f64; 3] {
         match self {
             Self::Beam | Self::RolledBeam => [2.0, 0.5, 0.5],
+            Self::RolledLump | Self::SlippedLump => [0.2, 0.04, 0.2],
             _ => [0.24, 0.06, 0.12],
         }
     }
@@ -177,13 +198,14 @@ fn measure(size: &Size, engines: &[Engine; 2], figures: &mut Figures) -> Vec<Cas
         let alone = size.alone.then(|| Case::new(size, scene, 1, 1));
         [0, 1].map(|volume| Case::new(size, scene, volume, 2)).into_iter().chain(alone)
     };
-    let mut cases: Vec<Case> = Scene::ALL.into_iter().flat_map(case).collect();
+    let lumps = Scene::LUMPS.into_iter().filter(|_| size.lump).map(|scene| Case::new(size, scene, 1, 2));
+    let mut cases: Vec<Case> = Scene::ALL.into_iter().flat_map(case).chain(lumps).collect();
     for _ in 0..ROUNDS {
         figures.calibrate();
         for case in cases.iter_mut().filter(|case| case.spent < ENOUGH) {
             let engine = &engines[case.threads - 1];
             let (start, _) = cook(engine, &case.graph, 1..=1);
-            let (report, positions) = cook(engine, &case.graph, 2..=size.frames + 1);
+            let (report, positions) = cook(engine, &case.graph, 2..=case.scene.frames(size) + 1);
             let took = [start.cooking, report.cooking];
             case.least = std::array::from_fn(|end| case.least[end].min(took[end]));
             case.spent += took[0] + took[1];
@@ -191,7 +213,7 @@ fn measure(size: &Size, engines: &[Engine; 2], figures: &mut Figures) -> Vec<Cas
         }
     }
     for case in &cases {
-        figures.add(&*case.name, size.frames as u32, case.least[1].saturating_sub(case.least[0]));
+        figures.add(&*case.name, case.scene.frames(size) as u32, case.least[1].saturating_sub(case.least[0]));
     }
     cases
 }
@@ -228,6 +250,10 @@ fn compare(cases: &[Case], figures: &Figures) {
     let of_free = |scene| of(scene, 1) / of(Scene::Free, 1);
     let [rolled, rolled_kept] = [0, 1].map(|volume| of(Scene::RolledBeam, volume) / of(Scene::Beam, volume));
     println!("\nrolled beam ÷ beam {rolled:.2} without volumes, {rolled_kept:.2} with, target: at most 2.5");
+    for lump in cases.iter().filter(|case| case.scene.is_lump()) {
+        let most = if lump.scene == Scene::RolledLump { 25 } else { 10 };
+        println!("{}: {:.1} Newton a frame, target: at most {most}", lump.name, lump.mean("newton"));
+    }
     println!("rolling ÷ free {:.2}, target: at most 2.5", of_free(Scene::Rolling));
     println!("resting ÷ free {:.2}, stiff ÷ free {:.2}", of_free(Scene::Resting), of_free(Scene::Stiff));
     let volumes = Scene::ALL.map(|scene| format!("{} {:.2}", scene.name(), of(scene, 1) / of(scene, 0)));
@@ -248,7 +274,7 @@ fn peak(size: &Size, scene: Scene) -> Option<f64> {
 /// The child process: cooks, and prints its peak memory, kB.
 fn cook_for_peak(size: &str, scene: &str) {
     let size = SIZES.iter().find(|known| known.name == size).expect("a size");
-    let scene = Scene::ALL.into_iter().find(|known| known.name() == scene).expect("a scene");
+    let scene = Scene::ALL.into_iter().chain(Scene::LUMPS).find(|known| known.name() == scene).expect("a scene");
     let engine = Engine::new(&Settings { threads: 2, ..Settings::default() }).expect("threads");
     cook(&engine, &graph(size, scene, r#""volume": 1"#), 2..=3);
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -280,7 +306,7 @@ fn graph(size: &Size, scene: Scene, params: &str) -> Graph {
     };
     let (points, tets) = cubes(cells, low, sides);
     let points: Vec<[f32; 3]> = points.iter().map(|p| p.map(|x| x as f32)).collect();
-    let last = size.frames + 1;
+    let last = scene.frames(size) + 1;
     let (before, inputs, own) = match scene {
         Scene::Beam => (held(&points), r#""pins": ["pins"]"#, r#""stiffness": 3.04e6, "damping": 1e-3"#),
         Scene::RolledBeam => (
@@ -294,7 +320,12 @@ fn graph(size: &Size, scene: Scene, params: &str) -> Graph {
         Scene::Rolling => {
             (DOUGH_PIN.rolls(last, sides), r#""colliders": ["pin"]"#, r#""stiffness": 5e3, "ground": true"#)
         }
+        Scene::RolledLump => (LUMP.into(), r#""colliders": ["pin"]"#, LUMP_PARAMS),
+        Scene::SlippedLump => (LUMP.into(), r#""colliders": ["pin"]"#, LUMP_PARAMS),
     };
+    let friction = if scene == Scene::RolledLump { r#", "friction": 1"# } else { "" };
+    let friction = if scene == Scene::SlippedLump { r#", "friction": 0"# } else { friction };
+    let tets_of = if scene.is_lump() { "lump" } else { "body" };
     let wires = if inputs.is_empty() { String::new() } else { format!(", {inputs}") };
     let text = format!(
         r#"{{
@@ -305,8 +336,8 @@ fn graph(size: &Size, scene: Scene, params: &str) -> Graph {
                 {before}
                 "soft": {{
                     "type": "Softbody",
-                    "inputs": {{ "bodies": ["body"]{wires} }},
-                    "params": {{ {own}, {params}, "self_collision": false }}
+                    "inputs": {{ "bodies": ["{tets_of}"]{wires} }},
+                    "params": {{ {own}{friction}, {params}, "self_collision": false }}
                 }}
             }},
             "outputs": {{ "body": "soft.tets" }}
@@ -329,6 +360,28 @@ fn held(points: &[[f32; 3]]) -> String {
            "pins": {{ "type": "Softbody_Pin", "inputs": {{ "targets": "end" }}, "params": {{ "radius": 1e-5 }} }},"#
     )
 }
+
+/// The lump of graphs/dough_rolling, finer, and a pin that comes down, rolls across and turns as it rolls.
+const LUMP: &str = r#"
+    "sphere": { "type": "Mesh_Primitive", "params": { "shape": "sphere", "size": [0.2, 0.09, 0.2], "divisions": 13 } },
+    "flat": {
+        "type": "Attribute_Expr",
+        "inputs": { "geometry": "sphere" },
+        "params": { "component": "mesh", "code": "P.y = clamp(P.y, -0.02, 0.02)" }
+    },
+    "placed": { "type": "Transform", "inputs": { "geometry": "flat" }, "params": { "translate": [0, 0.022, 0] } },
+    "lump": { "type": "Tetrahedralize", "inputs": { "surface": "placed" } },
+    "wood": { "type": "Mesh_Primitive", "params": { "shape": "cylinder", "size": [0.06, 0.3, 0.06], "divisions": 12 } },
+    "pin": {
+        "type": "Transform",
+        "inputs": { "geometry": "wood" },
+        "params": {
+            "translate": { "keyframes": [[1, [-0.12, 0.064, 0]], [4, [-0.10, 0.054, 0]], [24, [0.10, 0.054, 0]]] },
+            "rotate": { "keyframes": [[4, [90, 0, 0]], [14, [90, 0, -190.986]], [24, [90, 0, -381.972]]] }
+        }
+    },"#;
+const LUMP_PARAMS: &str = r#""stiffness": 3e4, "damping": 0.02, "ground": true, "thickness": 2e-3,
+    "plastic_yield": 0.05, "plastic_creep": 25"#;
 
 /// A rolling pin that moves ten thicknesses a frame. Metres.
 struct Pin {

@@ -134,6 +134,11 @@ impl Layout {
         clusters().for_each(|cluster| first[cluster as usize] = first[cluster as usize].min(least));
     }
 
+    /// The piece of a particle.
+    pub(super) fn piece_of(&self, particle: usize) -> usize {
+        self.piece[self.cluster[particle] as usize] as usize
+    }
+
     /// Number of rows of the coarse matrix.
     pub(super) fn rows(&self) -> usize {
         MODES * self.first.len()

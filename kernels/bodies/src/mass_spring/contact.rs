@@ -190,6 +190,11 @@ impl ContactConstraint {
         self.weights.iter().sum::<f64>().abs() < 0.5
     }
 
+    /// Whether slip is resisted.
+    pub(super) fn has_friction(&self) -> bool {
+        self.friction > 0.0
+    }
+
     /// Whether it is closed at `x` although the obstacle leaves no room there.
     pub(super) fn is_jammed(&self, x: &[DVec3]) -> bool {
         self.jammed && self.clearance(x, 0.0) < 0.0
@@ -344,7 +349,7 @@ impl ContactConstraint {
 
     fn load_at_depth(&self, depth: f64) -> f64 {
         // Where the surfaces penetrate each other, the force only separates them and causes no friction.
-        if depth <= 0.0 || self.gap_fraction(depth) > 1.0 {
+        if depth <= 0.0 || self.gap_fraction(depth + self.allowed_depth) > 1.0 {
             return 0.0;
         }
         let deepest = if self.gap > 0.0 { LINEAR_FROM * self.gap } else { f64::INFINITY };

@@ -1,12 +1,10 @@
-//! Implicit Euler with contacts: detect, solve, and repeat while contacts were missed, tetrahedra became thin or
-//! friction loads changed.
+//! Implicit Euler with contacts: detect, solve, and repeat while contacts were missed or tetrahedra became thin.
 //!
 //! Friction is solved with given normal loads: first those of the last step, then those found by the descent, until
-//! they agree. Each solve therefore minimises an objective, and the result satisfies Coulomb's law for its own normal
-//! forces.
+//! they agree (see [`super::friction`]). The result satisfies Coulomb's law for its own normal forces.
 
 use super::contact::{Contact, ContactConstraint, ContactQuery};
-use super::search::{StopCriteria, reload};
+use super::search::StopCriteria;
 use super::springs::distance;
 use super::stage::{Solved, Stage};
 use super::step::{Kinematics, Stepper, deepest, sum};
@@ -35,16 +33,23 @@ impl Stepper<'_> {
             .iter()
             .filter_map(|contact| ContactConstraint::new(body, contact, self.seconds, &self.solver.particle_stiffness));
         let displacement = body.spacing * h / self.seconds;
-        known.map(|c| c.depenetrating(&start.x, h, displacement).with_load(&start.x, &start.loads, h)).collect()
+        let known = known.map(|c| c.depenetrating(&start.x, h, displacement).with_load(&start.x, &start.loads, h));
+        let mut known: Vec<ContactConstraint> = known.collect();
+        // Contacts of the same particles share the last loads.
+        let asked = self.loads(&known, |contact| contact.load);
+        for contact in known.iter_mut().filter(|contact| contact.load > 0.0) {
+            let shares = contact.sides().map(|(particle, _)| start.loads[particle] / asked[particle]);
+            contact.load *= shares.fold(1.0, f64::min);
+        }
+        known
     }
 
-    /// The largest normal force of a contact on each particle at `x`.
-    pub(super) fn loads(&self, contacts: &[ContactConstraint], x: &[DVec3]) -> Vec<f64> {
-        let mut loads = vec![0.0; x.len()];
+    /// The sum over contacts of loads on each particle.
+    pub(super) fn loads(&self, contacts: &[ContactConstraint], of: impl Fn(&ContactConstraint) -> f64) -> Vec<f64> {
+        let mut loads = vec![0.0; self.context.body.len()];
         for contact in contacts {
-            for (particle, _) in contact.sides() {
-                loads[particle] = f64::max(loads[particle], contact.load_at(x));
-            }
+            let load = of(contact);
+            contact.sides().for_each(|(particle, weight)| loads[particle] += weight.abs() * load);
         }
         loads
     }
@@ -106,7 +111,6 @@ impl Stepper<'_> {
             let again = self.solver.descend(&self.context, &stage, contacts, enough, self.cached, &mut x);
             solved = Solved { residual: again.residual, ..sum(solved, again) };
             (enough.square, enough.first) = (solved.enough, solved.first);
-            let changed = reload(contacts, &x, &self.solver.v, h, self.context.body.size).is_some();
             let (mut found, missed) = self.find_missed(contacts, motion, &x, times);
             let thinned = self.watch_thin(&x);
             // Contacts that were deep before are being separated. A contact plane at the end of a step may report
@@ -118,7 +122,7 @@ impl Stepper<'_> {
             };
             solved.unmet = found.iter().filter(sank).map(|c| -c.clearance(&x, 0.0)).fold(0.0, f64::max);
             solved.deepest = deepest(&found, &x);
-            if round == MOST_ROUNDS || !(missed || changed || thinned) {
+            if round == MOST_ROUNDS || !(missed || thinned) {
                 break;
             }
             if missed {

@@ -26,6 +26,7 @@ mod energy;
 mod euler;
 mod external;
 mod frame;
+mod friction;
 mod galerkin;
 mod momentum;
 mod particle_order;

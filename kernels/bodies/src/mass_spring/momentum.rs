@@ -41,7 +41,7 @@ impl StageSolver {
     /// contact.
     pub(super) fn find_free_groups(&mut self, context: &FrameContext<'_>, contacts: &[ContactConstraint]) {
         let pieces_in_all = context.body.order.pieces.len();
-        let piece_of = |particle: usize| self.layout.piece[self.layout.cluster[particle] as usize];
+        let piece_of = |particle: usize| self.layout.piece_of(particle) as u32;
         self.system.held.clone_from(&context.external.held);
         let (mut bound, mut touched) = (vec![false; pieces_in_all], vec![false; pieces_in_all]);
         let alone = &self.system.isolated;
@@ -86,8 +86,8 @@ impl StageSolver {
         let known = stage.contacts.iter().zip(&self.contact_states).zip(&self.friction_duals).enumerate();
         let obstacle_contacts = known.filter(|known| known.1.0.1.mode != ContactMode::Open).filter_map(
             |(index, ((contact, state), dual))| {
-                let piece = self.layout.piece[self.layout.cluster[contact.particles[0] as usize] as usize];
-                let group = self.groups[piece as usize].filter(|_| !contact.is_two_sided())? as usize;
+                let piece = self.layout.piece_of(contact.particles[0] as usize);
+                let group = self.groups[piece].filter(|_| !contact.is_two_sided())? as usize;
                 Some(ObstacleContact {
                     group,
                     contact: index,

@@ -89,6 +89,12 @@ impl RigidMotion {
         Self { angular_velocity: DVec3::zeros(), ..self }
     }
 
+    /// With accelerations given as velocities, the force and the torque ÷ radius of gyration that cause them, newtons.
+    pub(super) fn force(&self, body: &SoftBody) -> f64 {
+        let mass: f64 = body.mass[self.particles.clone()].iter().sum();
+        (mass * (mass * self.linear_velocity.norm_squared() + 2.0 * self.energy)).sqrt()
+    }
+
     /// Velocity at position `x`.
     pub(super) fn velocity(&self, x: DVec3) -> DVec3 {
         self.linear_velocity + self.angular_velocity.cross(&(x - self.centroid))

@@ -3,6 +3,7 @@
 
 use super::assemble::velocities;
 use super::contact::ContactConstraint;
+use super::friction::LoadBalance;
 use super::springs;
 use super::stage::{FrameContext, Solved, Stage, StageSolver};
 use super::state::CachedCoarseFactor;
@@ -14,11 +15,11 @@ const HALVINGS: usize = 16;
 const LONG: f64 = 0.2;
 /// Newton iterations of a stage without contacts, and with contacts.
 const MOST: u32 = 4;
-const MOST_IN_CONTACT: u32 = 20;
-/// Iterations after which friction loads stay fixed, so that the descent terminates.
-const MOST_RELOADS: u32 = 8;
-/// Relative change of friction loads that requires an update.
-const CHANGED: f64 = 0.3;
+const MOST_IN_CONTACT: u32 = 60;
+/// The same where obstacles leave no room, so that loads have no balance.
+const MOST_JAMMED: u32 = 20;
+/// Changes of the loads of friction after which these stay fixed, so that the descent terminates.
+const MOST_RELOADS: u32 = 20;
 /// Fraction of the objective that is rounding: smaller decreases are not searched for.
 const ROUNDING: f64 = 1e-12;
 
@@ -61,8 +62,9 @@ struct LineSearch {
 }
 
 impl StageSolver {
-    /// Solves the stage from the initial guess `x` by Newton's method with line search, until the residual is small
-    /// and no contact is too deep. Updates the friction loads of `contacts` on the way.
+    /// Solves the stage from the initial guess `x` by Newton's method with line search, until the residual is small, no
+    /// contact is too deep, and the loads of friction are the normal forces of bodies in balance. Updates the loads of
+    /// `contacts` on the way.
     pub(super) fn descend(
         &mut self,
         context: &FrameContext<'_>,
@@ -73,9 +75,14 @@ impl StageSolver {
         x: &mut [DVec3],
     ) -> Solved {
         self.begin(context, contacts);
-        let most = if contacts.is_empty() { MOST } else { MOST_IN_CONTACT };
+        let jammed = contacts.iter().any(|contact| contact.is_jammed(x));
+        let most = match (contacts.is_empty(), jammed) {
+            (true, _) => MOST,
+            (_, true) => MOST_JAMMED,
+            (_, false) => MOST_IN_CONTACT,
+        };
         let mut solved = Solved::default();
-        let (mut base, mut slow, mut stuck) = (ObjectiveParts::default(), false, false);
+        let (mut base, mut slow, mut stuck, mut reloads) = (ObjectiveParts::default(), false, false, 0);
         loop {
             let stage = &Stage { contacts: &*contacts, ..*stage };
             self.assemble(context, stage, x, true);
@@ -88,10 +95,18 @@ impl StageSolver {
             }
             solved.set_residual(now);
             let deep = contacts.iter().any(|contact| contact.is_too_deep(x));
-            let wanted = (now > solved.enough && !slow) || deep;
+            let balance = if jammed { LoadBalance::default() } else { self.balance(context, stage, x) };
+            let reload = !balance.agrees() && reloads < MOST_RELOADS;
+            if reload && !deep && (stuck || balance.is_readable()) {
+                let a = stage.a;
+                base.contacts += self.reload(contacts, x, a, context.body.size);
+                (slow, stuck, reloads, self.measured) = (false, false, reloads + 1, true);
+                continue;
+            }
+            let wanted = (now > solved.enough && !slow) || deep || reload || !balance.is_in_balance();
             let is_cancelled = solved.newton > 0 && (context.cancelled)();
             if !wanted || stuck || is_cancelled || solved.newton >= most {
-                let gave_up = wanted && !stuck && most == MOST_IN_CONTACT;
+                let gave_up = wanted && !stuck && most > MOST;
                 solved.caps += u32::from(gave_up && (deep || self.is_unsettled(context.body)));
                 break;
             }
@@ -106,11 +121,6 @@ impl StageSolver {
             let all = share > LONG && !stopped;
             (slow, stuck) = (all && base.sum() - lower.sum() <= solved.enough, share == 0.0);
             base = lower;
-            let loads_may_change = share == 1.0 && !deep && solved.newton <= MOST_RELOADS;
-            if loads_may_change && let Some(more) = reload(contacts, x, &self.v, stage.a, context.body.size) {
-                base.contacts += more;
-                slow = false;
-            }
         }
         let stage = &Stage { contacts: &*contacts, ..*stage };
         if self.correct_angular_momentum_downhill(context, stage, base, x) && !solved.failed {
@@ -252,19 +262,4 @@ fn stop(context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3], trial: &mut 
         }
     }
     stopped
-}
-
-/// Updates friction loads to the normal forces at `x` if they changed by more than [`CHANGED`]; returns the resulting
-/// increase of the objective of a stage of `a`, with velocities `v`.
-pub(super) fn reload(contacts: &mut [ContactConstraint], x: &[DVec3], v: &[DVec3], a: f64, size: f64) -> Option<f64> {
-    let sums = contacts.iter().map(|contact| (contact.load_at(x), contact.load));
-    let (sum, changed) = sums.fold((0.0, 0.0), |sums, (now, then)| (sums.0 + now, sums.1 + (now - then).abs()));
-    (changed > CHANGED * sum).then(|| {
-        let more = contacts.iter_mut().map(|contact| {
-            let before = contact.friction_energy(v, a, size);
-            contact.load = contact.load_at(x);
-            contact.friction_energy(v, a, size) - before
-        });
-        a * a * more.sum::<f64>()
-    })
 }

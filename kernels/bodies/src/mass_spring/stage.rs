@@ -19,8 +19,9 @@ use numerics::vector::{DVec3, Vec3};
 
 /// Tolerance of linear solves, relative to the residual.
 const CG_SHARE: f64 = 0.1;
-/// That with contacts and a line search, where more Newton iterations follow anyway.
-const CG_SHARE_LINE_SEARCH: f64 = 0.2;
+/// That with contacts and a line search, where more Newton iterations follow anyway. With 0.2 those of stiff bodies that
+/// hit a surface do not find their loads of friction.
+const CG_SHARE_LINE_SEARCH: f64 = 0.17;
 /// That with contacts whose state is frozen: nothing corrects it later, so slip would drift and piles would jump.
 const CG_SHARE_FROZEN: f64 = 0.02;
 /// Noise in the rotation of free pieces that a linear solve may leave, as a fraction of their rotational energy: it
@@ -331,7 +332,11 @@ impl StageSolver {
         let square =
             if rotational_energy > 0.0 { 2.0 * stage.a * stage.a * NOISE * rotational_energy } else { f64::INFINITY };
         let in_contact = !stage.contacts.is_empty();
-        let asked = linear_tolerance(in_contact, stage.line_search);
+        let asked = match (in_contact, stage.line_search) {
+            (false, _) => CG_SHARE,
+            (true, true) => CG_SHARE_LINE_SEARCH,
+            (true, false) => CG_SHARE_FROZEN,
+        };
         let searching = in_contact && stage.line_search;
         let limits = Limits { share: asked, square, cap: bound.min(CG_CAP) };
         let mut reached = self.gradients(body, cached, limits);
@@ -387,31 +392,12 @@ impl StageSolver {
     }
 }
 
-/// Tolerance of linear solves, relative to the residual.
-fn linear_tolerance(in_contact: bool, line_search: bool) -> f64 {
-    match (in_contact, line_search) {
-        (false, _) => CG_SHARE,
-        (true, true) => CG_SHARE_LINE_SEARCH,
-        (true, false) => CG_SHARE_FROZEN,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::body::{Material, Mesh};
     use super::super::search::StopCriteria;
     use super::*;
     use crate::tets::cubes;
-
-    #[test]
-    fn only_stages_with_a_line_search_solve_contacts_loosely() {
-        assert_eq!(linear_tolerance(true, true), CG_SHARE_LINE_SEARCH);
-        assert_eq!(linear_tolerance(true, false), CG_SHARE_FROZEN);
-        const { assert!(CG_SHARE_FROZEN < CG_SHARE && CG_SHARE < CG_SHARE_LINE_SEARCH) };
-        for line_search in [false, true] {
-            assert_eq!(linear_tolerance(false, line_search), CG_SHARE);
-        }
-    }
 
     /// A spinning and deforming block without pins, whose angular momentum is corrected after Newton's method.
     #[test]

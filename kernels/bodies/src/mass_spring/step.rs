@@ -32,7 +32,7 @@ pub(super) struct Kinematics {
     pub(super) v: Vec<DVec3>,
     /// Acceleration in the last step, m/s²; used only by the predictor.
     pub(super) acceleration: Vec<DVec3>,
-    /// The last normal force of contacts on each particle, newtons.
+    /// The last normal forces of contacts on each particle, newtons.
     pub(super) loads: Vec<f64>,
 }
 
@@ -114,7 +114,7 @@ impl Stepper<'_> {
         let acceleration =
             |(v, before): (&DVec3, &DVec3)| if discontinuous { DVec3::zeros() } else { (v - before) / h };
         motion.acceleration = motion.v.iter().zip(&start.v).map(acceleration).collect();
-        motion.loads = self.loads(&full, &motion.x);
+        motion.loads = self.loads(&full, |contact| contact.load_at(&motion.x));
         self.keep_finite(&start, motion, &mut stepped);
         self.refresh_inventory(motion);
         stepped.after = match after.filter(|_| stepped.stopped == 0) {

@@ -159,6 +159,27 @@ fn a_block_on_a_slope_sticks_below_the_friction_angle_and_slides_above() {
     }
 }
 
+/// Sliding friction is μ times the normal force at any time, so the speed lost along the ground is μ times the change of
+/// speed across it, however stiff the block and however short the impact. One step a frame.
+#[test]
+fn a_block_that_hits_the_ground_obliquely_is_slowed_by_friction_times_its_change_of_speed() {
+    for stiffness in [1e5, 1e6, 1e7, 1e8] {
+        for friction in [0.0, 0.1, 0.2, 0.3, 0.5] {
+            let body = block_body([4, 4, 4], 0.025, &material(1000.0, stiffness, 1e-3));
+            let mut state = State::at_rest(&body);
+            state.positions.iter_mut().for_each(|x| x[1] += 0.05);
+            state.velocities.fill([2.0, -2.0, 0.0]);
+            let plane = ground(friction);
+            let frame = SolverFrame { gravity: [0.0; 3], contacts: Some(&plane), ..SolverFrame::default() };
+            let _ = steps(&body, &mut state, &frame, 8);
+            let mean = momentum(&body, &state);
+            let expected = 2.0 - friction * (2.0 + mean.y);
+            let off = (mean.x / expected - 1.0).abs();
+            assert!(off < 0.05, "E {stiffness}, μ {friction}: {} for {expected} m/s", mean.x);
+        }
+    }
+}
+
 #[test]
 fn contacts_hold_under_pins_that_press_ten_thicknesses_a_frame() {
     let ground = ground(0.5);

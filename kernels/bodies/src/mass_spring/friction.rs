@@ -1,0 +1,109 @@
+//! Loads of friction: whether they are the normal forces of bodies in balance.
+//!
+//! A stage is solved with given loads, so that friction has a potential. The loads are right once they are the normal
+//! forces that the solve ends with, which are read on the way, as soon as they are less wrong than the loads.
+//!
+//! How wrong normal forces are is seen from the force and torque that are left on a whole body. The norm of the residual
+//! does not show it: stiff springs and contacts turn a wrong force into a tiny displacement.
+
+use super::contact::ContactConstraint;
+use super::predictor::RigidMotion;
+use super::stage::{FrameContext, Stage, StageSolver};
+use numerics::vector::DVec3;
+
+/// Force and torque left on a body, and change of the sum of its loads, that are tolerated, relative to that sum. It
+/// decides how much a body that hits a surface is slowed.
+const TOLERATED: f64 = 0.03;
+/// Factor on that for a body which is pressed from opposite sides: what holds it is its stiffness.
+const PRESSED: f64 = 8.0;
+/// Change of single loads that is tolerated, relative to their sum.
+const TOLERATED_SINGLE: f64 = 0.5;
+/// Normal forces are read where what is left is less than this fraction of the change of single loads.
+const READABLE: f64 = 0.5;
+
+/// How far loads are from being the normal forces of bodies in balance; each for the body where it is the most.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LoadBalance {
+    /// Force left, or torque ÷ radius of gyration, and change of the sum of loads: relative to that sum, and ÷
+    /// [`PRESSED`] where it is pressed.
+    left: f64,
+    change: f64,
+    /// Change of single loads, relative to their sum.
+    single: f64,
+}
+
+impl LoadBalance {
+    pub(super) fn is_in_balance(&self) -> bool {
+        self.left <= TOLERATED
+    }
+
+    pub(super) fn agrees(&self) -> bool {
+        self.change <= TOLERATED && self.single <= TOLERATED_SINGLE
+    }
+
+    /// Whether normal forces are less wrong than the loads.
+    pub(super) fn is_readable(&self) -> bool {
+        self.left < READABLE * self.single
+    }
+}
+
+/// Normal forces on a piece, as loads of friction.
+#[derive(Clone, Copy, Debug, Default)]
+struct PieceLoads {
+    sum: f64,
+    /// Their vector sum.
+    net: DVec3,
+    /// The difference of their sum from that of the loads, and the sum of differences.
+    change: f64,
+    single: f64,
+}
+
+impl StageSolver {
+    /// The balance of loads at `x`, for which the residual was just evaluated. Pinned pieces are in balance.
+    pub(super) fn balance(&self, context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3]) -> LoadBalance {
+        let body = context.body;
+        let mut pieces = vec![PieceLoads::default(); body.order.pieces.len()];
+        for contact in stage.contacts.iter().filter(|contact| contact.has_friction()) {
+            let now = contact.load_at(x);
+            let mut last = usize::MAX;
+            for (particle, weight) in contact.sides() {
+                let piece = self.layout.piece_of(particle);
+                let loads = &mut pieces[piece];
+                loads.net += contact.normal * (weight * now);
+                if piece != last {
+                    loads.sum += now;
+                    loads.change += now - contact.load;
+                    loads.single += (now - contact.load).abs();
+                }
+                last = piece;
+            }
+        }
+        let mut balance = LoadBalance::default();
+        if pieces.iter().all(|piece| piece.sum == 0.0 && piece.single == 0.0) {
+            return balance;
+        }
+        let left: Vec<DVec3> = self.r.iter().zip(&body.mass).map(|(r, mass)| r / (stage.a * stage.a * mass)).collect();
+        for (piece, loads) in
+            body.order.pieces.iter().zip(&pieces).filter(|piece| piece.1.single > 0.0 || piece.1.sum > 0.0)
+        {
+            let pressed = 1.0 + (PRESSED - 1.0) * (1.0 - (loads.net.norm() / loads.sum).min(1.0));
+            let left = RigidMotion::new(body, &self.system.held, piece, x, &left, &left).force(body);
+            let left = if loads.sum > 0.0 { left / (loads.sum * pressed) } else { 0.0 };
+            balance.left = balance.left.max(left);
+            balance.change = balance.change.max(loads.change.abs() / (loads.sum * pressed));
+            balance.single = balance.single.max(loads.single / loads.sum);
+        }
+        balance
+    }
+
+    /// Sets the loads of friction to the normal forces at `x`, with the current velocities; returns the increase of the
+    /// objective of a stage of `a`.
+    pub(super) fn reload(&self, contacts: &mut [ContactConstraint], x: &[DVec3], a: f64, size: f64) -> f64 {
+        let more = contacts.iter_mut().map(|contact| {
+            let before = contact.friction_energy(&self.v, a, size);
+            contact.load = contact.load_at(x);
+            contact.friction_energy(&self.v, a, size) - before
+        });
+        a * a * more.sum::<f64>()
+    }
+}
