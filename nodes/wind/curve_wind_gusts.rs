@@ -117,6 +117,8 @@ pub(crate) static NODE: Node = Node::new(
     &gust_control::POINTS,
     &gust_control::SHAPE,
     &gust_control::OUTER,
+    &gust_control::OUTER_BELOW,
+    &gust_control::OUTER_ABOVE,
     &gust_control::STRENGTH,
     &gust_control::RAMP,
 ])

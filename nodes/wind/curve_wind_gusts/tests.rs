@@ -60,14 +60,15 @@ fn bits(out: &BenchResult) -> Vec<u8> {
 
 /// A Gust_Control as it comes along a wire: a ball or cubes about `centre`.
 fn control(shape: ControlShape, centre: [f32; 3], radius: f32, strength: f32) -> Component {
-    let points = outline(shape, 2.0, 0).iter().map(|p| [0, 1, 2].map(|k| centre[k] + radius * p[k])).collect();
+    let points =
+        outline(shape, [[2.0; 3]; 2], 0).iter().map(|p| [0, 1, 2].map(|k| centre[k] + radius * p[k])).collect();
     let falling = ramp(&[[0.0, 1.0], [1.0, 0.0]]);
     gust_control::component(points, shape, 2.0, strength, &falling).unwrap()
 }
 
 /// Makes a control of what the suite wires into `controls`: its position comes from the points, its numbers from the
 /// attributes, which are random if present.
-fn as_control(_: usize, given: Geometry) -> Geometry {
+fn as_control(wire: usize, given: Geometry) -> Geometry {
     let points = given.points().unwrap();
     let Some((shapes, keys)) = points.get(gust_control::SHAPE).zip(points.get(gust_control::RAMP)) else {
         return given;
@@ -79,6 +80,12 @@ fn as_control(_: usize, given: Geometry) -> Geometry {
     let number = |attribute: Attr<f32>| points.get(attribute).map_or(1.0, |values| values[0]);
     made.set(gust_control::STRENGTH, vec![number(gust_control::STRENGTH); rows]).unwrap();
     made.set(gust_control::OUTER, vec![1.0 + number(gust_control::OUTER); rows]).unwrap();
+    // Every second control has an outer box of its own.
+    for sides in [gust_control::OUTER_BELOW, gust_control::OUTER_ABOVE].into_iter().filter(|_| wire % 2 == 1) {
+        if let Some(values) = points.get(sides) {
+            made.set(sides, vec![values[0].map(|x| 1.0 + x.abs()); rows]).unwrap();
+        }
+    }
     made.set(gust_control::RAMP, (0..rows).map(|row| [[0.0, keys[0][1], 0.0], [1.0, 0.0, 0.0]][row.min(1)]).collect())
         .unwrap();
     made.into()
@@ -403,7 +410,8 @@ fn strength_multiplies_each_influence() {
     }
     // A control of strength ½ about the CV, full at its centre: 0.125 + 2 · 0.5 · 0.25.
     let by_hand = |strength: f32| {
-        let outline = outline(ControlShape::Sphere, 1.0, 1).into_iter().map(|[x, y, z]| [x + 5.0, y, z]).collect();
+        let outline =
+            outline(ControlShape::Sphere, [[1.0; 3]; 2], 1).into_iter().map(|[x, y, z]| [x + 5.0, y, z]).collect();
         let keys = Ramp::constant(0.25);
         let points = gust_control::component(outline, ControlShape::Sphere, 1.0, 0.5, &keys).unwrap();
         at(gust.clone().set(NUM_GUSTS, 0).input(CONTROLS, Geometry::from(points)).set(STRENGTH, strength))
