@@ -85,7 +85,7 @@ pub(crate) static NODE: Node = Node::new(
 .outputs(&[&OUT])
 .reads(&[&P, &ENVELOPE])
 .writes(&[&ENVELOPE, &SHIELDED, &SHELTER])
-.attributes(|params| group::attributes(params, GROUP))
+.attributes(|params| group::attributes(params, &[GROUP]))
 .metrics(METRICS)
 .neutral(|params, wires| match params {
     _ if wires.count(&COLLIDERS) == 0 => Some("no collider is wired"),

@@ -135,7 +135,7 @@ const ROUNDING: f64 = 1e-6;
 mod tests {
     use super::*;
     use conformance::{Bench, BenchResult, bench, conforms};
-    use curves::gusts::{Control, Gusts, evaluate};
+    use curves::gusts::{Control, GustMasks, Gusts, evaluate};
     use engine::param::{Source, Value};
     use numerics::ramp::Interpolation;
 
@@ -148,7 +148,18 @@ mod tests {
     fn felt(out: &BenchResult, points: &[[f32; 3]]) -> Vec<f32> {
         let controls = gust_control::controls(out.part(Kind::Points), 0).unwrap();
         let none = Ramp::constant(0.0);
-        evaluate(points, &Gusts { base: 0.0, falloff: &none, spheres: &[], controls: &controls, incoming: None }).values
+        evaluate(
+            points,
+            &Gusts {
+                base: 0.0,
+                falloff: &none,
+                spheres: &[],
+                controls: &controls,
+                incoming: None,
+                masks: GustMasks::NONE,
+            },
+        )
+        .values
     }
 
     fn linear(bench: Bench) -> Bench {

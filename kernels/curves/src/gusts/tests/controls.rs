@@ -11,7 +11,18 @@ fn linear(keys: &[[f32; 2]]) -> Ramp {
 /// A ramp that shows the distance itself: 1 − distance inside, 0 outside.
 fn felt(control: Control, points: &[[f32; 3]]) -> Vec<f32> {
     let falloff = one();
-    evaluate(points, &Gusts { base: 0.0, falloff: &falloff, spheres: &[], controls: &[control], incoming: None }).values
+    evaluate(
+        points,
+        &Gusts {
+            base: 0.0,
+            falloff: &falloff,
+            spheres: &[],
+            controls: &[control],
+            incoming: None,
+            masks: GustMasks::NONE,
+        },
+    )
+    .values
 }
 
 #[test]
@@ -57,7 +68,8 @@ fn negative_strengths_subtract_and_sums_follow_the_list_order() {
     let falloff = one();
     let control = |strength| Control::new(ControlShape::Sphere, [0.0; 3], UNIT, 2.0, one(), strength);
     let with = |controls: &[Control]| {
-        let gusts = Gusts { base: 0.75, falloff: &falloff, spheres: &[], controls, incoming: None };
+        let gusts =
+            Gusts { base: 0.75, falloff: &falloff, spheres: &[], controls, incoming: None, masks: GustMasks::NONE };
         evaluate(&[[0.5, 0.0, 0.0]], &gusts).values[0]
     };
     assert_eq!(with(&[control(-0.5)]), 0.25);
