@@ -49,6 +49,7 @@ fn main() {
             mode: BendMode::ResolutionFree { reference_segments: 4.0 },
             blend: 1.0.into(),
             noise: None,
+            gusts: None,
         };
         let goal = bend(&starts, &rest, &wind).points;
         for method in [ContactMethod::Exact, ContactMethod::Steps(10)].into_iter().take(arg(2, 2)) {

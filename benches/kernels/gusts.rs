@@ -4,7 +4,7 @@
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
-use curves::gusts::{Control, ControlShape, Draw, Gusts, Plane, Sphere, evaluate_on};
+use curves::gusts::{Control, ControlShape, Draw, GustMasks, Gusts, Plane, Sphere, evaluate_on};
 use numerics::ramp::{Interpolation, Ramp};
 use numerics::simd::Path;
 use std::hint::black_box;
@@ -31,6 +31,7 @@ fn spheres(count: u32, radius: [f32; 2], noise: [f32; 2]) -> Vec<Sphere> {
         life: [96.0; 2],
         decay: [0.0; 2],
         repeat: 0.0,
+        period: 0,
     };
     let plane = Plane::new([[0.0; 3], [2.0, 0.1, 2.0]], [1.0, 0.0, 0.0], 0.5, [0.0; 2]);
     let sphere = |gust: &curves::gusts::Gust| {
@@ -63,7 +64,7 @@ fn main() {
         ("1,000,000 × 5, 20 gusts, noise", &large, spheres(20, [0.3, 0.6], [0.0, 0.3]), &[]),
     ];
     for (name, points, spheres, controls) in &cases {
-        let gusts = Gusts { base: 0.0, falloff: &falloff, spheres, controls, incoming: None };
+        let gusts = Gusts { base: 0.0, falloff: &falloff, spheres, controls, incoming: None, masks: GustMasks::NONE };
         let paths = Path::all();
         let mut best = vec![f64::INFINITY; paths.len()];
         let rounds = if points.len() > 1_000_000 { ROUNDS / 10 } else { ROUNDS };

@@ -28,13 +28,14 @@ fn groom(curves: u32, cvs: u32) -> (Vec<u32>, Vec<[f32; 3]>) {
 fn main() {
     let ramp = Ramp::new(vec![[0.0, 0.2], [1.0, 1.0]], Interpolation::Linear).expect("the keys are in order");
     let fields = [NoiseKind::Perlin, NoiseKind::Billow, NoiseKind::Wavelet].map(|kind| Field::new(kind, 2, 0.5, 7));
-    let noise = |kind: usize, waviness| {
+    let noise = |kind: usize, waviness: f32| {
         Some(BendNoise {
             field: &fields[kind],
             amplitude: 0.5.into(),
             frequency: 2.0,
-            waviness,
+            waviness: waviness.into(),
             origin: [0.3, 0.0, 0.0],
+            other: None,
             roots: None,
         })
     };
@@ -62,6 +63,7 @@ fn main() {
             mode: *mode,
             blend: 1.0.into(),
             noise: noise.clone(),
+            gusts: None,
         };
         let paths = Path::all();
         let mut best = vec![f64::INFINITY; paths.len()];

@@ -13,12 +13,16 @@
 //! * If `skin` is wired, each curve swings in the frame in which Curve_Attach would move it: in every step the fraction
 //!   `inherit_motion` of that frame's rigid motion is applied to the swing and its target, and only the rest is lagged.
 //!   Where the skin collapses to a line or a point it carries curves without rotating them.
+//! * Curves of a clump are drawn from their own swing to the mean swing of the clump, on the output: as springs are linear,
+//!   that is the swing of a curve on the mean of their targets.
 //! * While `blend` is 0, or `ramp` is nowhere above 0, nothing swings: when they rise, curves start from rest.
 
+use crate::shared::clump;
 use crate::shared::group::{self, Group};
 use curves::attach::{RootPositions, SkinBinding};
 use curves::jiggle::{Drag, Jiggle, MASK_RANGE, RigidStep, Spring, steps_to_forget, with_lengths_between};
 use engine::prelude::*;
+use numerics::masked::Masked;
 use numerics::ramp::Ramp;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -52,9 +56,10 @@ params! { PARAMS:
         "Softness from root (0) to tip (1): divides `frequency`, so at ½ a CV swings twice as fast as at 1. Where it \
          is 0 or less, CVs follow the incoming curve exactly; the root always does.");
     DRAG: Param<DragChoice> = Param::choice("drag", Drag::Target, "The motion that damping resists.");
-    INHERIT_MOTION: Param<f32> = Param::float("inherit_motion", 1.0,
+    INHERIT_MOTION: Param<Maskable> = Param::maskable("inherit_motion", 1.0,
         "How much of the skin's own motion curves follow without lag: at 1 only motion relative to the skin, such as \
-         wind, makes them swing; at 0 they also lag behind the skin itself, as if no skin were wired.")
+         wind, makes them swing; at 0 they also lag behind the skin itself, as if no skin were wired. The mask is read at \
+         the root.")
         .within(0.0, 1.0);
     TOLERANCE: Param<f64> = Param::double("tolerance", 1e-3,
         "Fraction of a swing that may be neglected. It sets how many previous frames the result depends on: smaller \
@@ -67,6 +72,9 @@ params! { PARAMS:
         "How much of the swing is applied: 0 gives the incoming curves, 1 the whole swing. Lengths are kept at any \
          value. While it is 0 nothing swings; when it rises from 0, curves start from rest.").within(0.0, 1.0);
     GROUP: Param<Name> = group::param();
+    CLUMP: Param<Name> = clump::NAME;
+    CLUMP_RADIUS: Param<f32> = clump::RADIUS;
+    CLUMP_BLEND: Param<Maskable> = clump::BLEND;
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The swinging curves. Lengths and roots are those of `curves`.");
@@ -91,12 +99,12 @@ pub(crate) static NODE: Node = Node::new(
 .outputs(&[&OUT])
 .reads(&[&P])
 .writes(&[&P])
-.attributes(|params| group::attributes(params, GROUP))
+.attributes(|params| group::attributes(params, &[GROUP, CLUMP]))
 .metrics(METRICS)
 .neutral(|params, _| stands_still(params))
 .leaves_out(|params, wires| match params {
     _ if wires.count(&SKIN) == 0 => vec![LeftOut::new("skin", "no `skin` is wired")],
-    _ if params.get(INHERIT_MOTION) == 0.0 => vec![LeftOut::new("skin", "`inherit_motion` is 0")],
+    _ if params.get(INHERIT_MOTION).value == 0.0 => vec![LeftOut::new("skin", "`inherit_motion` is 0")],
     _ => Vec::new(),
 })
 .restores_between(keep_lengths);
@@ -171,7 +179,11 @@ impl Chain for Swing {
         cx.publish(WINDOW_FRAMES, f64::from(past(cx.params(), clock).frames));
         let mut farthest = 0.0;
         if let Some(springs) = &self.springs {
-            let shaped = springs.shape(group::masked(blend, factors.as_deref()));
+            let blend = group::masked(blend, factors.as_deref());
+            let shaped = match clump::of(cx.params(), cx.part(CURVES), Some(&self.rest))? {
+                Some(clumps) => springs.shape_clumped(blend, &clumps, cx.mask(CLUMP_BLEND, cx.part(CURVES))?),
+                None => springs.shape(blend),
+            };
             farthest = shaped.max_offset;
             curves.set(P, shaped.points)?;
         }
@@ -217,9 +229,9 @@ impl Swing {
 
     /// The motion that each curve inherits from its skin over the step to this frame; `None` where it inherits none.
     fn inherited(&self, cx: &StepCx) -> Result<Option<Vec<RigidStep>>> {
-        let share = f64::from(cx.get(INHERIT_MOTION));
+        let share = cx.mask(INHERIT_MOTION, cx.part(CURVES))?;
         let (Some(rest), Some(skin), Some(now)) = (&self.rest_skin, &self.skin, cx.part(SKIN)) else { return Ok(None) };
-        if share == 0.0 {
+        if share.value == 0.0 {
             return Ok(None);
         }
         let roots = RootPositions::of(self.rest.runs().starts(), self.rest.positions());
@@ -230,8 +242,21 @@ impl Swing {
         // Cached with the skin: the next step reads them again, a second state at the same frame too, and a skin that
         // stands still keeps them.
         let poses = |skin: &Component| skin.kept(key.clone(), || Ok(binding.poses(skin.positions())));
-        Ok(Some(RigidStep::all_between(binding, &poses(skin)?, &poses(now)?, share)))
+        let (before, now) = (poses(skin)?, poses(now)?);
+        if share.mask.is_none() {
+            return Ok(Some(RigidStep::all_between(binding, &before, &now, f64::from(share.value))));
+        }
+        // A curve without CVs has no root.
+        let at_root = |cvs: std::ops::Range<usize>| if cvs.is_empty() { 0.0 } else { share_at(share, cvs.start) };
+        let shares: Vec<f64> = cx.part(CURVES).runs().ranges().map(at_root).collect();
+        Ok(Some(RigidStep::each_between(binding, &before, &now, &shares)))
     }
+}
+
+/// The number at a root, 0..1; NaN counts as 0.
+fn share_at(share: Masked<'_, f32>, root: usize) -> f64 {
+    let share = share.at(root);
+    f64::from(if share > 0.0 { share.min(1.0) } else { 0.0 })
 }
 
 /// Refuses a component whose topology is not that of the scene's first frame.

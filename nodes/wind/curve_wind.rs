@@ -9,10 +9,15 @@
 //!   proportional to the frame number would jump where speed or direction are keyed.
 //! * In the paper a curve of n segments bends more than one of n/2; `resolution_free` turns by a share of the angle per
 //!   length instead.
+//! * With `loop` the pattern is a blend of two, a loop apart: one fades out while the other fades in, so that frame
+//!   f + `loop` has the noise of frame f. Squares of both parts sum to 1, which keeps its strength on average.
+//! * `gust_dir`, what gusts add to a wind of length 1, is added to wind and noise.
 //! * `blend` scales each segment's turn instead of mixing positions, so that a partial wind keeps lengths too.
 
-use crate::shared::direction::unit_direction;
+use crate::shared::clump;
+use crate::shared::direction::{GUST_DIR, unit_direction};
 use crate::shared::group::{self, Group};
+use curves::clumps::drawn;
 use curves::wind_bend::{Bend, BendMode, BendNoise, bend};
 use engine::prelude::*;
 use numerics::noise::{Field, NoiseKind};
@@ -52,7 +57,10 @@ choice! {
 inputs! { INPUTS:
     CURVES: Input = Input::one("curves", Kind::Curves, "The curves, root first. Their `envelope` scales the wind at \
         each CV.")
-        .read_at(|params| if rest_from_start(params) { Times::NOW.and(Times::START) } else { Times::NOW });
+        .read_at(|params| {
+            let start = rest_from_start(params) || finds_clumps(params);
+            if start { Times::NOW.and(Times::START) } else { Times::NOW }
+        });
 }
 
 params! { PARAMS:
@@ -77,9 +85,13 @@ params! { PARAMS:
     SCROLL: Param<f64> = Param::double("scroll", 1.0,
         "How fast the noise pattern moves downwind. 0 holds it still.")
         .unit(Unit::MetresPerSecond).soft(-10.0, 10.0).history().when(has_noise);
+    LOOP: Param<f64> = Param::double("loop", 0.0,
+        "Number of frames after which the noise comes again, for a cycle that can be repeated; keyed params must repeat \
+         too. The pattern fades over into itself, so it should move by a feature or more in this time. 0 does not loop.")
+        .unit(Unit::Frames).at_least(0.0).soft(0.0, 240.0).when(|params| has_noise(params) && params.get(SCROLL) != 0.0);
     NOISE_SPACE: Param<Space> = Param::choice("noise_space", Space::World,
         "Whether the noise pattern stays in the world or sticks to the animal.").when(has_noise);
-    WAVINESS: Param<f32> = Param::float("waviness", 0.0,
+    WAVINESS: Param<Maskable> = Param::maskable("waviness", 0.0,
         "How much the noise changes along a curve: at 0 each curve bends as a whole; from about 1 on, waves run \
          through it. Each CV samples the noise this many times its arc length downwind of the root.")
         .soft(0.0, 4.0).when(has_noise);
@@ -97,6 +109,9 @@ params! { PARAMS:
          kept at any value.").within(0.0, 1.0);
     SEED: Param<Seed> = Param::seed("Each seed gives another noise pattern.").when(has_noise);
     GROUP: Param<Name> = group::param();
+    CLUMP: Param<Name> = clump::NAME;
+    CLUMP_RADIUS: Param<f32> = clump::RADIUS;
+    CLUMP_BLEND: Param<Maskable> = clump::BLEND;
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The bent curves. Lengths and roots are unchanged.");
@@ -111,15 +126,15 @@ pub(crate) static NODE: Node = Node::new(
     2,
     "Bends curves in the wind, root to tip, without stretching them. Each CV turns the rest of its curve towards the \
      wind. Noise, which moves downwind, varies the wind's direction from place to place. An `envelope` on the CVs (1 \
-     if missing) scales the wind; gusts and shielding write it.",
+     if missing) scales the wind; gusts and shielding write it. `gust_dir`, which gusts write, is added to its direction.",
     Cook::Frame { cook, reads_clock: |params| has_noise(params) && params.get(SCROLL) != 0.0 },
 )
 .inputs(INPUTS)
 .params(PARAMS)
 .outputs(&[&OUT])
-.reads(&[&P, &ENVELOPE, &PREF])
+.reads(&[&P, &ENVELOPE, &PREF, &GUST_DIR])
 .writes(&[&P])
-.attributes(|params| group::attributes(params, GROUP))
+.attributes(|params| group::attributes(params, &[GROUP, CLUMP]))
 .metrics(METRICS)
 .neutral(|params, _| match params {
     _ if params.get(GLOBAL_ROTATE).value == 0.0 => Some("`global_rotate` is 0"),
@@ -139,13 +154,15 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
     let field =
         field.map(|kind| Field::new(kind, cx.get(OCTAVES) as u32, cx.get(ROUGHNESS), u64::from(cx.get(SEED).0)));
     let roots = if field.is_some() { noise_roots(cx, &curves)? } else { None };
+    let scroll = Scroll::at(cx);
     let noise = |field| -> Result<BendNoise<'_>> {
         Ok(BendNoise {
             field,
             amplitude: cx.mask(AMPLITUDE, &curves)?,
             frequency: cx.get(FREQUENCY),
-            waviness: cx.get(WAVINESS),
-            origin: noise_origin(cx),
+            waviness: cx.mask(WAVINESS, &curves)?,
+            origin: scroll.origin,
+            other: scroll.other,
             roots: roots.as_deref(),
         })
     };
@@ -167,6 +184,8 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
             },
             blend: cx.mask(BLEND, &curves)?,
             noise: field.as_ref().map(noise).transpose()?,
+            // Without shear it is 0 everywhere, which need not be read at each CV.
+            gusts: curves.get(GUST_DIR).filter(|rows| rows.as_flattened().iter().any(|x| *x != 0.0)),
         },
     );
     cx.publish(MAX_ANGLE, f64::from(bent.max_angle));
@@ -192,15 +211,61 @@ fn rest_from_start(params: &Params) -> bool {
     has_noise(params) && params.get(NOISE_SPACE) == Space::Rest
 }
 
+fn finds_clumps(params: &Params) -> bool {
+    has_noise(params) && clump::reads_start(params)
+}
+
 /// The offset from a root to its position in the noise: the scene's origin minus the distance that the pattern has
 /// moved downwind.
-fn noise_origin(cx: &FrameCx) -> [f64; 3] {
-    let moved = cx.integral(cx.frame());
-    std::array::from_fn(|axis| cx.origin()[axis] - moved[axis])
+struct Scroll {
+    origin: [f64; 3],
+    /// The same a loop before, and its share.
+    other: Option<([f64; 3], f32)>,
+}
+
+impl Scroll {
+    fn at(cx: &FrameCx) -> Self {
+        let from = |moved: [f64; 3]| std::array::from_fn(|axis| cx.origin()[axis] - moved[axis]);
+        let ticks = (cx.get(LOOP) * Frame::TICKS as f64).round() as i64;
+        if ticks == 0 {
+            return Self { origin: from(cx.integral(cx.frame())), other: None };
+        }
+        let passed = cx.frame().ticks().rem_euclid(ticks);
+        let [now, before] = [passed, passed - ticks].map(|ticks| from(moved(cx, Frame::whole(0).plus_ticks(ticks))));
+        Self { origin: now, other: Some((before, (passed as f64 / ticks as f64) as f32)) }
+    }
+}
+
+/// ∫ `scroll` · wind dt from frame 0 to `upto`. After the frame that is cooked, which is asked for before frame 0 alone,
+/// scroll and wind are taken as they are then.
+fn moved(cx: &FrameCx, upto: Frame) -> [f64; 3] {
+    let now = cx.frame().max(Frame::whole(0));
+    if upto <= now {
+        return cx.integral(upto);
+    }
+    let ([speed], since) = (cx.integrands(cx.frame().number()), cx.integral(now));
+    let seconds = upto.seconds(cx.fps()) - now.seconds(cx.fps());
+    std::array::from_fn(|axis| since[axis] + speed[axis] * seconds)
 }
 
 /// Where each curve's noise is sampled, if not at its current root.
 fn noise_roots(cx: &FrameCx, curves: &Component) -> Result<Option<Vec<[f32; 3]>>> {
+    let start = finds_clumps(cx.params()).then(|| cx.part_at_start(CURVES));
+    let (rest, clumps) = (rest_roots(cx, curves)?, clump::of(cx.params(), curves, start)?);
+    let Some(clumps) = clumps else { return Ok(rest) };
+    let share = cx.mask(CLUMP_BLEND, curves)?;
+    let mut roots = rest.unwrap_or_else(|| clump::roots(curves).as_slice().to_vec());
+    let ways = clumps.to_means(&roots);
+    for ((cvs, root), way) in curves.runs().ranges().zip(&mut roots).zip(&ways) {
+        if !cvs.is_empty() {
+            *root = drawn(*root, way, share.at(cvs.start));
+        }
+    }
+    Ok(Some(roots))
+}
+
+/// Where the curves' roots are at rest, if that is where noise is sampled.
+fn rest_roots(cx: &FrameCx, curves: &Component) -> Result<Option<Vec<[f32; 3]>>> {
     if !rest_from_start(cx.params()) {
         return Ok(None);
     }
@@ -221,280 +286,4 @@ fn noise_roots(cx: &FrameCx, curves: &Component) -> Result<Option<Vec<[f32; 3]>>
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use conformance::{Bench, BenchResult, bench, conforms};
-    use engine::graph::Scene;
-    use numerics::vector;
-
-    /// A straight curve up from the origin, of `segments` segments and length 1.
-    fn upright(segments: usize) -> Geometry {
-        let cv = |k: usize| [0.0, k as f32 / segments as f32, 0.0];
-        Component::curves(vec![segments as u32 + 1], (0..=segments).map(cv).collect()).unwrap().into()
-    }
-
-    /// A field of upright curves, a metre apart.
-    fn field(n: usize) -> Geometry {
-        let cvs = (0..n * n).flat_map(|i| (0..5).map(move |k| [(i % n) as f32, 0.25 * k as f32, (i / n) as f32]));
-        Component::curves(vec![5; n * n], cvs.collect()).unwrap().into()
-    }
-
-    fn calm(curves: Geometry) -> Bench {
-        bench(&NODE).input(CURVES, curves).set(NOISE, None)
-    }
-
-    /// Angle of each segment of the first curve to the wind along x, radians.
-    fn angles(out: &BenchResult) -> Vec<f64> {
-        let cvs = &out.curves().positions()[out.curves().runs().range(0)];
-        let angle = |pair: &[[f32; 3]]| {
-            let d: [f64; 3] = std::array::from_fn(|k| f64::from(pair[1][k]) - f64::from(pair[0][k]));
-            libm::atan2((d[1] * d[1] + d[2] * d[2]).sqrt(), d[0])
-        };
-        cvs.windows(2).map(angle).collect()
-    }
-
-    #[test]
-    fn conforms_to_its_declaration() {
-        conforms(&NODE);
-    }
-
-    const RIGHT: f64 = std::f64::consts::FRAC_PI_2;
-
-    #[test]
-    fn the_angle_of_segment_k_is_multiplied_by_one_minus_g_to_the_k() {
-        // W2 by hand: at every CV the rest of a straight curve turns by g times the remaining angle, so segment k = 1…
-        // has 90° · (1 − g)^k: 45, 22.5, 11.25, 5.625 for g = ½.
-        let out = calm(upright(4)).set(GLOBAL_ROTATE, 0.5.into()).cook();
-        for (k, angle) in angles(&out).iter().enumerate() {
-            let left = RIGHT / f64::from(2 << k);
-            assert!((angle - left).abs() < 4e-6, "segment {}: {angle} rad, expected {left}", k + 1);
-        }
-        assert!((out.metrics["max_angle"] - (RIGHT - RIGHT / 16.0)).abs() < 4e-6);
-        assert!(out.metrics["length_error"] < 1e-6);
-    }
-
-    #[test]
-    fn resolution_free_bends_the_same_for_any_number_of_cvs() {
-        let tip = |segments: usize| {
-            let out = calm(upright(segments)).set(MODE, Mode::ResolutionFree).cook();
-            out.curves().positions()[segments]
-        };
-        let fine = tip(1024);
-        let [coarse, finer] = [8, 16].map(|segments| vector::length(vector::sub(tip(segments), fine)));
-        assert!(coarse < 1e-2, "{coarse}");
-        assert!((3.0..5.0).contains(&(coarse / finer)), "order 2: {coarse} to {finer}");
-    }
-
-    #[test]
-    fn the_envelope_scales_the_turn_and_counts_as_one_if_missing() {
-        let with = |envelope: f32| {
-            let mut curves = upright(1);
-            curves.part_mut(Kind::Curves).unwrap().set(ENVELOPE, vec![envelope; 2]).unwrap();
-            angles(&calm(curves).cook())[0]
-        };
-        assert!((with(0.5) - RIGHT * 0.75).abs() < 1e-6);
-        assert_eq!(with(0.0), RIGHT);
-        assert_eq!(with(-3.0), RIGHT, "an envelope below 0 counts as 0");
-        assert_eq!(with(1.0), angles(&calm(upright(1)).cook())[0]);
-    }
-
-    #[test]
-    fn masks_scale_per_cv_and_missing_ones_are_refused() {
-        let mut curves = upright(1);
-        curves.part_mut(Kind::Curves).unwrap().set(Attr::<f32>::point("soft"), vec![0.5, 1.0]).unwrap();
-        let masked = Maskable { value: 0.5, attribute: Some("soft".into()) };
-        let out = calm(curves).set(GLOBAL_ROTATE, masked.clone()).cook();
-        assert!((angles(&out)[0] - RIGHT * 0.75).abs() < 1e-6);
-        let error = calm(upright(1)).set(GLOBAL_ROTATE, masked.clone()).try_cook().unwrap_err();
-        assert_eq!(error.fact, "`global_rotate` is masked by `soft`, which the curves do not have");
-        let mut curves = upright(1);
-        curves.part_mut(Kind::Curves).unwrap().set(Attr::<[f32; 3]>::element("soft"), vec![[0.5; 3]]).unwrap();
-        let error = calm(curves).set(GLOBAL_ROTATE, masked).try_cook().unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "`global_rotate` is masked by `soft`, which is one float3 for each curve; expected one float for each CV"
-        );
-    }
-
-    /// A mask of whole numbers, of each CV or of each curve, is that of the floats with these values.
-    #[test]
-    fn a_mask_may_be_whole_numbers_or_numbers_of_curves() {
-        let with = |set: &dyn Fn(&mut Component)| {
-            let mut curves = field(2);
-            set(curves.part_mut(Kind::Curves).unwrap());
-            let masked = Maskable { value: 0.5, attribute: Some("soft".into()) };
-            calm(curves).set(GLOBAL_ROTATE, masked).cook().curves().positions().to_vec()
-        };
-        let of = |curve: usize| [0.0_f32, 1.0, 2.0, 0.5][curve];
-        let floats = with(&|curves| curves.set(Attr::point("soft"), (0..20).map(|cv| of(cv / 5)).collect()).unwrap());
-        let curves = with(&|curves| curves.set(Attr::element("soft"), (0..4).map(of).collect()).unwrap());
-        assert_eq!(floats, curves);
-        let ones =
-            with(&|curves| curves.set(Attr::point("soft"), (0..20).map(|cv| of(cv / 5).floor()).collect()).unwrap());
-        let whole = |count: usize| (0..count).map(|row| of(row * 4 / count) as i32).collect::<Vec<i32>>();
-        assert_eq!(ones, with(&|curves| curves.set(Attr::point("soft"), whole(20)).unwrap()));
-        assert_eq!(ones, with(&|curves| curves.set(Attr::element("soft"), whole(4)).unwrap()));
-        assert_ne!(ones, floats);
-    }
-
-    /// Curves of the group bend as without one; the others keep their bits, and so does the part of a curve before its first
-    /// CV in the group.
-    #[test]
-    fn outside_a_group_curves_keep_their_bits() {
-        let mut curves = field(3);
-        let part = curves.part_mut(Kind::Curves).unwrap();
-        part.set(Attr::<i32>::element("third"), (0..9).map(|curve| curve % 3).collect()).unwrap();
-        part.set(Attr::<f32>::point("tips"), (0..45).map(|cv| if cv % 5 >= 2 { 0.5 } else { 0.0 }).collect()).unwrap();
-        let windy = |name: &str| bench(&NODE).input(CURVES, curves.clone()).set(GROUP, name.into()).cook();
-        let at = |out: &BenchResult, cv: usize| out.curves().positions()[cv].map(f32::to_bits);
-        let (still, all, third) = (curves.curves().unwrap().positions(), windy(""), windy("third"));
-        for (cv, still) in still.iter().enumerate() {
-            let expected = if cv / 5 % 3 == 0 { still.map(f32::to_bits) } else { at(&all, cv) };
-            assert_eq!(at(&third, cv), expected, "CV {cv}");
-        }
-        let tips = windy("tips");
-        for (cv, still) in still.iter().enumerate() {
-            assert_eq!(at(&tips, cv) == still.map(f32::to_bits), cv % 5 <= 2, "CV {cv}");
-        }
-        assert!(tips.metrics["length_error"] < 1e-6);
-    }
-
-    /// Where the mask is 0 the wind blows straight, where it is 1 as without a mask.
-    #[test]
-    fn a_mask_scales_the_noise_where_it_is() {
-        let with = |amplitude: f32, mask: Option<fn(usize) -> f32>| {
-            let mut curves = field(2);
-            let part = curves.part_mut(Kind::Curves).unwrap();
-            let attribute = mask.map(|mask| {
-                part.set(Attr::element("noisy"), (0..4).map(mask).collect()).unwrap();
-                Name::from("noisy")
-            });
-            let bench = bench(&NODE).input(CURVES, curves).set(AMPLITUDE, Maskable { value: amplitude, attribute });
-            bench.cook().curves().positions().to_vec()
-        };
-        let (straight, noisy) = (with(0.0, None), with(0.8, None));
-        let mixed = with(0.8, Some(|curve| (curve % 2) as f32));
-        for curve in 0..4 {
-            let expected = if curve % 2 == 0 { &straight } else { &noisy };
-            assert_eq!(mixed[curve * 5..][..5], expected[curve * 5..][..5], "curve {curve}");
-            assert_ne!(straight[curve * 5 + 4], noisy[curve * 5 + 4]);
-        }
-    }
-
-    #[test]
-    fn half_blend_is_half_the_turn_and_keeps_lengths() {
-        let whole = angles(&calm(upright(4)).cook());
-        let out = calm(upright(4)).set(BLEND, 0.5.into()).cook();
-        for (half, whole) in angles(&out).iter().zip(whole) {
-            assert!((RIGHT - half - 0.5 * (RIGHT - whole)).abs() < 4e-6);
-        }
-        assert!(out.metrics["length_error"] < 1e-6);
-    }
-
-    #[test]
-    fn without_a_turn_the_same_arrays_pass_through() {
-        let curves = field(2);
-        for share in [GLOBAL_ROTATE, BLEND] {
-            let out = bench(&NODE).input(CURVES, curves.clone()).set(share, 0.0.into()).cook();
-            let column = |part: &Component| part.table(Owner::Point).column("P").unwrap().address();
-            assert_eq!(column(out.curves()), column(curves.curves().unwrap()));
-        }
-    }
-
-    #[test]
-    fn noise_scrolls_downwind() {
-        // After a second at 2 m/s, the noise that was at x is at x + 2: curve 2 bends as curve 0 did.
-        let windy = bench(&NODE).input(CURVES, field(4)).set(SCROLL, 2.0);
-        let shape = |out: &BenchResult, curve: usize| {
-            let cvs = &out.curves().positions()[out.curves().runs().range(curve)];
-            cvs.iter().map(|cv| vector::sub(*cv, cvs[0])).collect::<Vec<_>>()
-        };
-        let (early, late) = (windy.clone().at(10.0).cook(), windy.at(34.0).cook());
-        for (a, b) in shape(&early, 0).iter().zip(shape(&late, 2)) {
-            assert!((0..3).all(|k| (a[k] - b[k]).abs() < 1e-5), "{a:?} {b:?}");
-        }
-        assert_ne!(shape(&early, 0), shape(&late, 0));
-    }
-
-    #[test]
-    fn a_keyed_scroll_does_not_jump() {
-        // From 1 to 100 m/s within a frame: the pattern must not move farther than its speed allows.
-        let windy =
-            bench(&NODE).input(CURVES, field(3)).set(FREQUENCY, 0.001).keyed(SCROLL, &[(10.0, 1.0), (11.0, 100.0)]);
-        let frames = windy.frames(8..=14);
-        let moved = |pair: &[BenchResult]| {
-            let points = pair.iter().map(|out| out.curves().positions()).collect::<Vec<_>>();
-            points[0].iter().zip(points[1]).map(|(a, b)| (a[0] - b[0]).abs()).fold(0.0, f32::max)
-        };
-        // 100 m/s × 1/24 s × 0.001 cells a metre is 0.004 cells; the field's slope is below 4 a cell.
-        assert!(frames.windows(2).map(moved).fold(0.0, f32::max) < 0.02);
-    }
-
-    #[test]
-    fn frames_cooked_alone_have_the_same_bits() {
-        let windy = bench(&NODE)
-            .input(CURVES, field(5))
-            .keyed(WIND_DIR, &[(1.0, [1.0, 0.0, 0.0]), (20.0, [0.0, 0.2, 1.0])])
-            .keyed(SCROLL, &[(1.0, 0.5), (20.0, 3.0)]);
-        let bits = |out: &BenchResult| out.curves().table(Owner::Point).column("P").unwrap().to_bytes();
-        let in_order = windy.frames(1..=20);
-        for frame in [20_i64, 7, 13, 1] {
-            let alone = windy.clone().threads(if frame == 7 { 1 } else { 7 }).at(frame as f64).cook();
-            assert_eq!(bits(&alone), bits(&in_order[frame as usize - 1]), "frame {frame}");
-        }
-    }
-
-    #[test]
-    fn rest_noise_sticks_to_a_moving_animal() {
-        let moving = |frame: Frame| {
-            let mut curves = field(3);
-            for row in curves.part_mut(Kind::Curves).unwrap().edit(P).unwrap() {
-                row[0] += 0.37 * (frame.number() - 1.0) as f32;
-            }
-            curves
-        };
-        let windy = bench(&NODE).moving(CURVES, moving).set(SCROLL, 0.0);
-        let bend = |space: Space, frame: f64| {
-            let out = windy.clone().set(NOISE_SPACE, space).at(frame).cook();
-            let cvs = out.curves().positions();
-            [cvs[4][0] - cvs[0][0], cvs[4][1] - cvs[0][1]]
-        };
-        let close = |a: [f32; 2], b: [f32; 2]| (a[0] - b[0]).abs() < 1e-5 && (a[1] - b[1]).abs() < 1e-5;
-        assert!(close(bend(Space::Rest, 1.0), bend(Space::Rest, 9.0)));
-        assert!(!close(bend(Space::World, 1.0), bend(Space::World, 9.0)));
-    }
-
-    #[test]
-    fn the_origin_of_the_scene_moves_the_noise_only() {
-        let windy = bench(&NODE).input(CURVES, field(2));
-        let at = |origin: [f64; 3], shift: f32| {
-            let mut curves = field(2);
-            curves.part_mut(Kind::Curves).unwrap().edit(P).unwrap().iter_mut().for_each(|row| row[0] += shift);
-            let scene = Scene { origin, ..Scene::default() };
-            let out = bench(&NODE).input(CURVES, curves).scene(scene).cook();
-            out.curves().positions().iter().map(|row| [row[0] - shift, row[1], row[2]]).collect::<Vec<_>>()
-        };
-        let (near, far) = (at([0.0; 3], 8.0), at([8.0, 0.0, 0.0], 0.0));
-        assert!(near.iter().zip(&far).all(|(a, b)| (0..3).all(|k| (a[k] - b[k]).abs() < 2e-6)));
-        assert_ne!(windy.cook().curves().positions(), far);
-    }
-
-    #[test]
-    fn wind_of_any_length_and_wind_against_the_curve_give_finite_results() {
-        for wind in [[1e-300, 0.0, 0.0], [1e300, 1e300, 0.0], [0.0, -1.0, 0.0], [0.0, 1.0, 0.0]] {
-            let out = calm(upright(4)).set(WIND_DIR, wind).cook();
-            assert!(out.curves().positions().as_flattened().iter().all(|x| x.is_finite()), "{wind:?}");
-            assert!(out.metrics["length_error"] < 1e-5);
-        }
-        let error = calm(upright(1)).set(WIND_DIR, [0.0; 3]).try_cook().unwrap_err();
-        assert_eq!(error.fact, "`wind_dir` is [0, 0, 0], which has no direction");
-    }
-
-    #[test]
-    fn empty_and_single_cv_curves_pass_through() {
-        let none = Geometry::from(Component::curves(Vec::new(), Vec::new()).unwrap());
-        assert_eq!(bench(&NODE).input(CURVES, none).cook().curves().point_count(), 0);
-        let dots = Geometry::from(Component::curves(vec![1, 1], vec![[1.0; 3], [2.0; 3]]).unwrap());
-        assert_eq!(bench(&NODE).input(CURVES, dots).cook().curves().positions(), [[1.0; 3], [2.0; 3]]);
-    }
-}
+mod tests;

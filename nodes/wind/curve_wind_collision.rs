@@ -154,7 +154,7 @@ pub(crate) static NODE: Node = Node::new(
 .outputs(&[&OUT])
 .reads(&[&P])
 .writes(&[&P, &UNFREED_SEGMENTS, &BLENDED_CURVE, &LOW_ROOT])
-.attributes(|params| group::attributes(params, GROUP))
+.attributes(|params| group::attributes(params, &[GROUP]))
 .metrics(METRICS)
 .neutral(|params, wires| match params {
     _ if wires.count(&COLLIDERS) + wires.count(&SKIN) == 0 => Some("neither `colliders` nor `skin` is wired"),

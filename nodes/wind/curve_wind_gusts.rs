@@ -13,11 +13,17 @@
 //! * Noise dents a sphere in its own space, by direction: the gust never reaches beyond its radius, and the influence
 //!   at its centre stays 1.
 //! * A gust fades over its decay while it travels on.
+//! * Each gust may also blow to a side of its own (`shear`): across the wind that launched it, in a direction drawn once.
+//!   `gust_dir` is the sum over all gusts of influence · `shear` · that direction. Gusts placed by hand have none.
+//! * With `loop` all gusts come again with the same random numbers, so that frame f + `loop` has the envelope of frame f
+//!   where params do not differ. `repeat_every` is rounded so that the loop has a whole number of repetitions.
 
-use crate::shared::direction::unit_direction;
+use crate::shared::clump;
+use crate::shared::direction::{GUST_DIR, unit_direction};
 use crate::shared::group::{self, Group};
 use crate::shared::gust_control;
-use curves::gusts::{Control, Draw, Gust, Gusts, Influence, Plane, Sphere, evaluate, scale};
+use curves::clumps::drawn;
+use curves::gusts::{Control, Draw, Gust, GustMasks, Gusts, Influence, Plane, Sphere, evaluate, scale, sideways};
 use engine::prelude::*;
 use numerics::ramp::Ramp;
 use numerics::vector::DVec3;
@@ -26,7 +32,9 @@ use std::sync::Arc;
 
 inputs! { INPUTS:
     CURVES: Input = Input::one("curves", Kind::Curves, "The curves, not yet bent by wind. Their `envelope` is scaled.")
-        .read_at(|params| if sends(params) { Times::NOW.and(Times::START) } else { Times::NOW });
+        .read_at(|params| {
+            if sends(params) || clump::reads_start(params) { Times::NOW.and(Times::START) } else { Times::NOW }
+        });
     CONTROLS: Input<Many> = Input::many("controls", Kind::Points, "Gusts placed by hand: Gust_Control nodes.");
 }
 
@@ -65,19 +73,30 @@ params! { PARAMS:
     REPEAT_EVERY: Param<f64> = Param::double("repeat_every", 0.0,
         "Number of frames after which each gust is sent again, with new random values. With 0 it is sent once.")
         .unit(Unit::Frames).at_least(0.0).soft(0.0, 240.0).when(is_asked);
+    LOOP: Param<f64> = Param::double("loop", 0.0,
+        "Number of frames after which the same gusts come again, for a cycle that can be repeated; keyed params must \
+         repeat too. `repeat_every` is then adjusted so that it divides the loop. 0 does not loop.")
+        .unit(Unit::Frames).at_least(0.0).soft(0.0, 240.0).when(is_asked);
     FALLOFF: Param<Arc<Ramp>> = Param::smooth_ramp("falloff", &[[0.0, 1.0], [1.0, 0.0]],
         "Strength of the wind within a gust, from its centre (0) to its boundary (1): 1 is the full wind.")
         .when(is_asked);
-    BASE: Param<f32> = Param::float("base", 0.0,
+    BASE: Param<Maskable> = Param::maskable("base", 0.0,
         "Strength of the wind outside gusts: at 0 it is calm between gusts; at 1 the full wind blows everywhere and \
          gusts add nothing.")
         .within(0.0, 1.0);
-    STRENGTH: Param<f32> = Param::float("strength", 1.0,
+    STRENGTH: Param<Maskable> = Param::maskable("strength", 1.0,
         "Multiplies what each gust adds, those placed by hand included: at 0 there are none, above 1 their full strength \
          reaches farther towards their boundaries. The wind never exceeds its full strength.")
         .at_least(0.0).soft(0.0, 4.0);
+    SHEAR: Param<Maskable> = Param::maskable("shear", 0.0,
+        "How strongly each gust also blows to a side of its own, relative to the wind: curves do not only bend more where \
+         a gust passes, but in another direction. Gusts placed by hand blow with the wind. 0 turns it off.")
+        .soft(0.0, 1.0).when(is_asked);
     SEED: Param<Seed> = Param::seed("Each seed gives other gusts.").when(is_asked);
     GROUP: Param<Name> = group::param();
+    CLUMP: Param<Name> = clump::NAME;
+    CLUMP_RADIUS: Param<f32> = clump::RADIUS;
+    CLUMP_BLEND: Param<Maskable> = clump::BLEND;
 }
 
 /// Strength of the wind at a CV by gusts alone.
@@ -86,7 +105,8 @@ const GUST: Attr<f32> = Attr::point("gust");
 const OUT: Output = Output::like(
     "curves",
     &CURVES,
-    "The curves, with their `envelope` scaled by the gusts, and `gust`, by which it was scaled.",
+    "The curves, with their `envelope` scaled by the gusts, and `gust`, by which it was scaled; with `shear` also \
+     `gust_dir`, which Curve_Wind adds to the direction of the wind.",
 );
 
 metrics! { METRICS:
@@ -114,20 +134,23 @@ pub(crate) static NODE: Node = Node::new(
 .reads(&[
     &P,
     &ENVELOPE,
+    &GUST_DIR,
     &gust_control::POINTS,
     &gust_control::SHAPE,
     &gust_control::OUTER,
+    &gust_control::OUTER_BELOW,
+    &gust_control::OUTER_ABOVE,
     &gust_control::STRENGTH,
     &gust_control::RAMP,
 ])
-.writes(&[&ENVELOPE, &GUST])
-.attributes(|params| group::attributes(params, GROUP))
+.writes(&[&ENVELOPE, &GUST, &GUST_DIR])
+.attributes(|params| group::attributes(params, &[GROUP, CLUMP]))
 .metrics(METRICS)
 .neutral(|params, wires| {
-    let full = params.get(BASE) == 1.0 && params.get(FALLOFF).min() >= 0.0;
+    let full = is_full(params) && params.get(SHEAR).value == 0.0;
     (full && wires.count(&CONTROLS) == 0).then_some("`base` is 1")
 })
-.neutral_fills(&[Fill::missing(ENVELOPE, 1.0), Fill::always(GUST, 1.0)])
+.neutral_fills(&[Fill::missing(ENVELOPE, 1.0), Fill::always(GUST, 1.0), Fill::missing_vectors(GUST_DIR)])
 .leaves_out(leaves_out)
 .integrates(direction)
 .integrates(|params| along(params, params.get(SPEED_RANGE).low))
@@ -136,49 +159,109 @@ pub(crate) static NODE: Node = Node::new(
 fn cook(cx: &FrameCx) -> Result<Outputs> {
     let mut curves = cx.edit(CURVES);
     let controls = controls(cx)?;
-    let (base, falloff) = (cx.get(BASE), cx.get(FALLOFF));
-    let full = base == 1.0 && falloff.min() >= 0.0 && controls.iter().all(Control::only_adds);
-    let (spheres, dropped) = if full || !sends(cx.params()) { (Vec::new(), 0) } else { sent(cx) };
-    cx.publish(ACTIVE_GUSTS, spheres.len() as f64);
-    cx.publish(DROPPED_GUSTS, dropped as f64);
+    let full = is_full(cx.params()) && controls.iter().all(Control::only_adds);
+    let shears = cx.get(SHEAR).value != 0.0 && cx.wants(GUST_DIR);
+    let sent = if (full && !shears) || !sends(cx.params()) { Sent::default() } else { sent(cx) };
+    cx.publish(ACTIVE_GUSTS, sent.spheres.len() as f64);
+    cx.publish(DROPPED_GUSTS, sent.dropped as f64);
     let group = Group::of(&cx.get(GROUP), &curves)?;
+    let felt = felt(cx, &curves, group.as_ref(), &controls, &sent, [!full, shears])?;
     let incoming = curves.get(ENVELOPE);
     let wanted = cx.wants(GUST);
-    let (envelope, gust, reached) = if full {
-        let ones = || vec![1.0; curves.point_count()];
-        (incoming.is_none().then(ones), wanted.then(ones), 0)
-    } else {
-        let gusts = Gusts { base, falloff: &falloff, spheres: &spheres, controls: &controls, incoming: None };
-        let Influence { values, reached } = match &group {
-            // Gusts alone, where anyone takes them, otherwise what comes in is scaled at once.
-            None => evaluate(curves.positions(), &Gusts { incoming: incoming.filter(|_| !wanted), ..gusts }),
-            Some(group) => {
-                let points: Vec<[f32; 3]> = group.cvs().map(|cv| curves.positions()[cv]).collect();
-                evaluate(&points, &gusts)
+    let (envelope, gust) = match (felt.values, &group) {
+        (None, _) => {
+            let ones = || vec![1.0; curves.point_count()];
+            (incoming.is_none().then(ones), wanted.then(ones))
+        }
+        (Some(values), None) => {
+            let mut envelope = values.clone();
+            if let Some(incoming) = incoming.filter(|_| wanted) {
+                scale(&mut envelope, incoming);
             }
-        };
-        match group {
-            None => {
-                let mut envelope = values.clone();
-                if let Some(incoming) = incoming.filter(|_| wanted) {
-                    scale(&mut envelope, incoming);
-                }
-                (Some(envelope), wanted.then_some(values), reached)
-            }
-            Some(group) => {
-                let (envelope, gust) = on_group(&group, &curves, values);
-                (Some(envelope), Some(gust), reached)
-            }
+            (Some(envelope), wanted.then_some(values))
+        }
+        (Some(values), Some(group)) => {
+            let (envelope, gust) = on_group(group, &curves, values);
+            (Some(envelope), Some(gust))
         }
     };
-    cx.publish(REACHED_POINTS, reached as f64);
+    cx.publish(REACHED_POINTS, felt.reached as f64);
     if let Some(envelope) = envelope {
         curves.set(ENVELOPE, envelope)?;
     }
     if let Some(gust) = gust.filter(|_| wanted) {
         curves.set(GUST, gust)?;
     }
+    if !shears && cx.wants(GUST_DIR) && curves.get(GUST_DIR).is_none() {
+        let none = vec![[0.0; 3]; curves.point_count()];
+        curves.set(GUST_DIR, none)?;
+    }
+    if let Some(sides) = felt.sides {
+        let mut all = curves.get(GUST_DIR).map_or_else(|| vec![[0.0; 3]; curves.point_count()], <[[f32; 3]]>::to_vec);
+        let shear = cx.mask(SHEAR, cx.part(CURVES))?;
+        let mut add = |cv: usize, side: [f32; 3]| {
+            for axis in 0..3 {
+                all[cv][axis] += shear.at(cv) * side[axis];
+            }
+        };
+        match &group {
+            None => sides.into_iter().enumerate().for_each(|(cv, side)| add(cv, side)),
+            Some(group) => group.cvs().zip(sides).for_each(|(cv, side)| add(cv, side)),
+        }
+        curves.set(GUST_DIR, all)?;
+    }
     Ok(OUT.with(curves))
+}
+
+/// What the CVs of a group, or all, feel of gusts.
+struct Felt {
+    /// `gust`; with the incoming envelope where nobody takes `gust` itself. `None` if it is 1 everywhere.
+    values: Option<Vec<f32>>,
+    reached: usize,
+    /// `gust_dir` for a `shear` of 1.
+    sides: Option<Vec<[f32; 3]>>,
+}
+
+/// `which` asks for values and for sides.
+fn felt(
+    cx: &FrameCx,
+    curves: &Component,
+    group: Option<&Group>,
+    controls: &[Control],
+    sent: &Sent,
+    which: [bool; 2],
+) -> Result<Felt> {
+    let falloff = cx.get(FALLOFF);
+    let input = cx.part(CURVES);
+    let (base, strength) = (cx.mask(BASE, input)?, cx.mask(STRENGTH, input)?);
+    let moved = clumped(cx, input)?;
+    let points = moved.as_deref().unwrap_or_else(|| input.positions());
+    let of_group = |mask: &[f32]| group.map(|group| group.cvs().map(|cv| mask[cv]).collect::<Vec<f32>>());
+    let own = [base.mask, strength.mask].map(|mask| mask.map(|mask| of_group(mask).unwrap_or_else(|| mask.to_vec())));
+    let masks = GustMasks { base: own[0].as_deref(), strength: own[1].as_deref() };
+    let chosen: Option<Vec<[f32; 3]>> = group.map(|group| group.cvs().map(|cv| points[cv]).collect());
+    let points = chosen.as_deref().unwrap_or(points);
+    // Gusts alone, where anyone takes them, otherwise what comes in is scaled at once.
+    let incoming = curves.get(ENVELOPE).filter(|_| !cx.wants(GUST) && group.is_none());
+    let gusts = Gusts { base: base.value, falloff: &falloff, spheres: &sent.spheres, controls, incoming, masks };
+    let found = which[0].then(|| evaluate(points, &gusts));
+    let sides = which[1].then(|| sideways(points, &gusts, &sent.sides));
+    let (values, reached) = found.map_or((None, 0), |Influence { values, reached }| (Some(values), reached));
+    Ok(Felt { values, reached, sides })
+}
+
+/// Where CVs feel gusts, if not at their own positions: as far from the mean root of their clump as from their own.
+fn clumped(cx: &FrameCx, curves: &Component) -> Result<Option<Vec<[f32; 3]>>> {
+    let start = clump::reads_start(cx.params()).then(|| cx.part_at_start(CURVES));
+    let Some(clumps) = clump::of(cx.params(), curves, start)? else { return Ok(None) };
+    let (share, ways) = (cx.mask(CLUMP_BLEND, curves)?, clumps.to_means(clump::roots(curves).as_slice()));
+    let mut points = curves.positions().to_vec();
+    for (cvs, way) in curves.runs().ranges().zip(&ways) {
+        for cv in cvs {
+            points[cv] = drawn(points[cv], way, share.at(cv));
+        }
+    }
+    Ok(Some(points))
 }
 
 /// `envelope` and `gust` where only the CVs of a group feel gusts, of these strengths. Others keep what they have, or have 1.
@@ -197,20 +280,29 @@ fn controls(cx: &FrameCx) -> Result<Vec<Control>> {
     let mut controls = Vec::new();
     for (wire, points) in cx.part(CONTROLS).into_iter().enumerate() {
         let found = gust_control::controls(points, wire)?;
-        controls.extend(found.into_iter().map(|control| control.times(cx.get(STRENGTH))));
+        controls.extend(found.into_iter().map(|control| control.times(cx.get(STRENGTH).value)));
     }
     Ok(controls)
 }
 
-/// The gusts alive at this frame, and how many were left out.
-fn sent(cx: &FrameCx) -> (Vec<Sphere>, u64) {
-    let Some(bounds) = cx.part_at_start(CURVES).bounds() else { return (Vec::new(), 0) };
+/// The gusts alive at this frame.
+#[derive(Default)]
+struct Sent {
+    spheres: Vec<Sphere>,
+    /// Where each blows besides, of length 1.
+    sides: Vec<[f32; 3]>,
+    /// How many were left out.
+    dropped: u64,
+}
+
+fn sent(cx: &FrameCx) -> Sent {
+    let Some(bounds) = cx.part_at_start(CURVES).bounds() else { return Sent::default() };
     let ends = |range: Param<Span>| {
         let Span { low, high } = cx.get(range);
         [low, high]
     };
     let frames = |range: Param<Span>| ends(range).map(f64::from);
-    let living = Draw {
+    let draw = Draw {
         seed: u64::from(cx.get(SEED).0),
         gusts: cx.get(NUM_GUSTS) as u32,
         radius: ends(RADIUS_RANGE),
@@ -219,13 +311,15 @@ fn sent(cx: &FrameCx) -> (Vec<Sphere>, u64) {
         life: frames(LIFE_RANGE),
         decay: frames(DECAY_RANGE),
         repeat: cx.get(REPEAT_EVERY),
-    }
-    .at(cx.frame().number());
+        period: 0,
+    };
+    let draw = if cx.get(LOOP) > 0.0 { draw.looped(cx.get(LOOP)) } else { draw };
+    let living = draw.at(cx.frame().number());
     let distance = cx.get(DISTANCE);
     let distance = if distance > 0.0 { distance } else { f64::from(cx.get(RADIUS_RANGE).high) };
     let area = cx.get(AREA).map(f64::from);
     let [_, slow, fast] = cx.integrals(cx.frame()).map(DVec3::from);
-    let strength = cx.get(STRENGTH);
+    let strength = cx.get(STRENGTH).value;
     // Gusts that start within the same frame are launched by the same wind.
     let mut known = BTreeMap::new();
     let sphere = |gust: &Gust| {
@@ -235,15 +329,18 @@ fn sent(cx: &FrameCx) -> (Vec<Sphere>, u64) {
             (Plane::new(bounds, launch.wind, distance, area), launch)
         });
         let from = DVec3::from(plane.at(gust.position));
-        Sphere {
+        let side = plane.direction(gust.side).map(|x| x as f32);
+        let sphere = Sphere {
             centre: (from + launch.travelled([slow, fast], gust)).into(),
             radius: gust.radius,
             strength: gust.strength * strength,
             noise: gust.noise,
             salt: gust.salt,
-        }
+        };
+        (sphere, side)
     };
-    (living.gusts.iter().map(sphere).collect(), living.dropped)
+    let (spheres, sides) = living.gusts.iter().map(sphere).unzip();
+    Sent { spheres, sides, dropped: living.dropped }
 }
 
 /// The wind at a whole frame at which gusts start, and over the frame before it.
@@ -299,6 +396,12 @@ fn is_asked(params: &Params) -> bool {
     params.get(NUM_GUSTS) > 0
 }
 
+/// Whether the wind blows at its full strength everywhere, whatever gusts there are, unless they take from it.
+fn is_full(params: &Params) -> bool {
+    let base = params.get(BASE);
+    base.value == 1.0 && base.attribute.is_none() && params.get(FALLOFF).min() >= 0.0
+}
+
 /// Whether any gust that is sent can reach anything.
 fn sends(params: &Params) -> bool {
     no_gusts(params).is_none()
@@ -326,6 +429,9 @@ fn leaves_out(params: &Params, wires: &Wires) -> Vec<LeftOut> {
             left_out.push(LeftOut::new("noise", "`radius_noise_range` is 0"));
         }
         None => {}
+    }
+    if params.get(SHEAR).value == 0.0 {
+        left_out.push(LeftOut::new("shear", "`shear` is 0"));
     }
     if wires.count(&CONTROLS) == 0 {
         left_out.push(LeftOut::new("controls", "no `controls` are wired"));

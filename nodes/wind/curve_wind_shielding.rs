@@ -42,6 +42,14 @@ params! { PARAMS:
         "Fraction of the wind that a fully sheltered curve loses: 0 leaves the wind alone, 1 removes all of it. Above \
          1 even partly sheltered curves become calm.")
         .at_least(0.0).soft(0.0, 1.0);
+    DISTANCE: Param<f32> = Param::float("distance", 0.0,
+        "Distance over which the lee fades: a collider this far upwind no longer shelters a CV, one beside it shelters \
+         it fully. 0 shelters alike at any distance up to `offset`.")
+        .unit(Unit::Metres).at_least(0.0).soft(0.0, 10.0);
+    FALLOFF: Param<f32> = Param::float("falloff", 1.0,
+        "How shelter fades over `distance`: at 1 evenly, above 1 soon behind the collider, below 1 late. At a distance s \
+         it is (1 − s ÷ `distance`) to the power of `falloff`.")
+        .at_least(0.0).soft(0.0, 4.0).when(|params| params.get(DISTANCE) > 0.0);
     SMOOTH: Param<f32> = Param::float("smooth", 0.0,
         "Softens the edge of the lee, so that shelter does not pop as the wind turns: each CV looks upwind through a \
          cone instead of along a line, and is sheltered by the fraction of the cone that is covered. 0 is a line, 1 a \
@@ -77,7 +85,7 @@ pub(crate) static NODE: Node = Node::new(
 .outputs(&[&OUT])
 .reads(&[&P, &ENVELOPE])
 .writes(&[&ENVELOPE, &SHIELDED, &SHELTER])
-.attributes(|params| group::attributes(params, GROUP))
+.attributes(|params| group::attributes(params, &[GROUP]))
 .metrics(METRICS)
 .neutral(|params, wires| match params {
     _ if wires.count(&COLLIDERS) == 0 => Some("no collider is wired"),
@@ -86,8 +94,11 @@ pub(crate) static NODE: Node = Node::new(
 })
 .neutral_fills(&[Fill::missing(ENVELOPE, 1.0), Fill::always(SHIELDED, 0.0), Fill::always(SHELTER, 0.0)])
 .leaves_out(|params, _| {
-    let stages =
-        [(params.get(SHIELD).value, "envelope", "`shield` is 0"), (params.get(SMOOTH), "cones", "`smooth` is 0")];
+    let stages = [
+        (params.get(SHIELD).value, "envelope", "`shield` is 0"),
+        (params.get(SMOOTH), "cones", "`smooth` is 0"),
+        (params.get(DISTANCE), "fading", "`distance` is 0"),
+    ];
     let left_out = stages.into_iter().filter(|(value, ..)| *value == 0.0);
     left_out.map(|(_, stage, why)| LeftOut::new(stage, why)).collect()
 });
@@ -134,6 +145,8 @@ fn sheltered(cx: &Cx, curves: &Component) -> Vec<f32> {
     let how = Shield {
         wind: cx.get(WIND_DIR),
         offset: cx.get(OFFSET),
+        distance: cx.get(DISTANCE),
+        falloff: cx.get(FALLOFF),
         cone: WIDEST_CONE * smooth,
         skin_gap: cx.get(SKIN_GAP),
     };
@@ -283,6 +296,47 @@ mod tests {
         assert_eq!(with(0.4).curves().get(SHIELDED), Some(&[0.0, 0.0][..]));
         assert_eq!(with(0.5).curves().get(SHIELDED), Some(&[0.5, 0.0][..]));
         assert_eq!(with(1e4).curves().get(SHIELDED), Some(&[0.5, 0.0][..]));
+    }
+
+    #[test]
+    fn shelter_fades_with_the_distance_of_the_nearest_collider() {
+        // The wall is 0.5 upwind; two of the four CVs are behind it. (1 − 0.5 ÷ 2) to the power of 1 and 2.
+        let share = |bench: Bench| bench.cook().curves().get(SHIELDED).unwrap()[0];
+        let near = |a: f32, b: f32| assert!((a - b).abs() < 1e-6, "{a} for {b}");
+        near(share(behind_a_wall().set(DISTANCE, 2.0)), 0.5 * 0.75);
+        near(share(behind_a_wall().set(DISTANCE, 2.0).set(FALLOFF, 2.0)), 0.5 * 0.5625);
+        near(share(behind_a_wall().set(DISTANCE, 2.0).set(FALLOFF, 0.0)), 0.5);
+        assert_eq!(share(behind_a_wall().set(DISTANCE, 0.4)), 0.0);
+        assert_eq!(share(behind_a_wall().set(DISTANCE, 0.5).set(FALLOFF, 0.0)), 0.0, "at its end nothing is left");
+        assert_eq!(share(behind_a_wall().set(DISTANCE, 2.0).set(OFFSET, 0.4)), 0.0, "`offset` still ends it");
+        // A second wall farther upwind changes nothing, one between does: 1 − 0.25 ÷ 2.
+        let at = |x: f32| {
+            let mut wall = wall(1.0);
+            wall.part_mut(Kind::Mesh).unwrap().edit(P).unwrap().iter_mut().for_each(|p| p[0] += x);
+            wall
+        };
+        let both = |x: f32| share(behind_a_wall().input(COLLIDERS, at(x)).set(DISTANCE, 2.0));
+        near(both(-1.0), 0.5 * 0.75);
+        near(both(0.25), 0.5 * 0.875);
+        // A cone that the wall covers all of, too: one CV low behind it.
+        let low: Geometry = Component::curves(vec![1], vec![[0.5, 0.0, 0.0]]).unwrap().into();
+        let cone = bench(&NODE).input(CURVES, low).input(COLLIDERS, wall(1.0)).set(SMOOTH, 1.0).set(DISTANCE, 2.0);
+        let found = share(cone);
+        assert!((found - 0.75).abs() < 1e-4, "{found}");
+    }
+
+    #[test]
+    fn fading_scales_with_the_scene() {
+        let shares = |scale: f32| {
+            let bench =
+                bench(&NODE).input(CURVES, curves(scale)).input(COLLIDERS, wall(scale)).set(OFFSET, 10.0 * scale);
+            bench.set(DISTANCE, 2.0 * scale).set(FALLOFF, 3.0).cook().curves().get(SHIELDED).unwrap().to_vec()
+        };
+        let here = shares(1.0);
+        assert!(here[0] > 0.2 && here[1] == 0.0);
+        for scale in [1e-6, 1e-3, 1e3, 1e6] {
+            assert!(here.iter().zip(shares(scale)).all(|(a, b)| (a - b).abs() < 1e-6), "{scale}");
+        }
     }
 
     #[test]

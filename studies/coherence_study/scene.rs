@@ -97,8 +97,9 @@ impl Groom {
             field: &self.field,
             amplitude: 0.7.into(),
             frequency: 2.0,
-            waviness: 0.5,
+            waviness: 0.5.into(),
             origin: [-2.0 * time, 0.0, 0.0],
+            other: None,
             roots: None,
         };
         let how = Bend {
@@ -109,6 +110,7 @@ impl Groom {
             mode: BendMode::Paper,
             blend: 1.0.into(),
             noise: storm.then_some(noise),
+            gusts: None,
         };
         bend(&self.starts, rest, &how).points
     }

@@ -23,6 +23,8 @@ pub struct Fill {
 enum Number {
     Float(Attr<f32>, f32),
     Int(Attr<i32>, i32),
+    /// Zero.
+    Vector(Attr<[f32; 3]>),
 }
 
 impl Fill {
@@ -41,10 +43,17 @@ impl Fill {
         Self { number: Number::Int(attribute, value), keep: false }
     }
 
+    /// Zero vectors where the attribute is missing, as long as anyone takes it; what is there passes through.
+    pub const fn missing_vectors(attribute: Attr<[f32; 3]>) -> Self {
+        Self { number: Number::Vector(attribute), keep: true }
+    }
+
     fn apply(&self, cx: &Cx, part: &mut Component) -> Result<()> {
         match self.number {
             Number::Float(attribute, value) => self.fill(cx, part, attribute, value),
             Number::Int(attribute, value) => self.fill(cx, part, attribute, value),
+            Number::Vector(attribute) if !cx.wants(attribute) => Ok(()),
+            Number::Vector(attribute) => self.fill(cx, part, attribute, [0.0; 3]),
         }
     }
 

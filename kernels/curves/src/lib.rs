@@ -7,6 +7,7 @@
 #![allow(clippy::needless_range_loop, reason = "a loop over lanes reads and writes many arrays")]
 
 pub mod attach;
+pub mod clumps;
 pub mod collide;
 pub mod deform;
 pub mod guides;

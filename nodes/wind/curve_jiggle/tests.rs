@@ -147,7 +147,7 @@ fn frames_cooked_alone_or_backwards_have_the_same_bits() {
         .moving(SKIN, skin)
         .scene(scene)
         .set(FREQUENCY, Maskable { value: 4.0, attribute: Some("soft".into()) })
-        .set(INHERIT_MOTION, 0.7)
+        .set(INHERIT_MOTION, 0.7.into())
         .keyed(DAMPING, &[(1.0, plain(0.8)), (60.0, plain(0.3)), (120.0, plain(2.0))]);
     let in_order = windy.frames(1..=120);
     for (frame, threads) in [(120, 1), (97, 7), (40, 1), (39, 7), (2, 1), (1, 7)] {
@@ -191,7 +191,7 @@ fn windows_after_a_key_of_the_frequency_are_long_enough() {
 fn curves_moved_rigidly_with_their_skin_do_not_swing_if_motion_is_inherited() {
     let curves = |frame: Frame| change(&field(), Kind::Curves, |p| rolled(frame.number(), p));
     let skin = |frame: Frame| change(&ground(), Kind::Mesh, |p| rolled(frame.number(), p));
-    let moving = |share: f32| bench(&NODE).moving(CURVES, curves).moving(SKIN, skin).set(INHERIT_MOTION, share);
+    let moving = |share: f32| bench(&NODE).moving(CURVES, curves).moving(SKIN, skin).set(INHERIT_MOTION, share.into());
     for frame in [2, 9, 33, 48] {
         let targets = curves(Frame::whole(frame));
         let out = moving(1.0).at(frame as f64).cook();
@@ -376,4 +376,59 @@ fn outside_a_group_curves_keep_their_bits() {
         assert_eq!(third.curves().positions()[cv].map(f32::to_bits), expected.map(f32::to_bits), "CV {cv}");
     }
     assert_ne!(all.curves().positions(), target.curves().unwrap().positions());
+}
+
+#[test]
+fn curves_of_a_clump_swing_by_the_mean_of_their_swings() {
+    // Curve k is blown by 0.002·k; 1, 2 and 3 are a clump, of the swing of curve 2.
+    let moving = |frame: Frame| -> Geometry {
+        let gust = libm::sin(0.9 * frame.number());
+        let mut curves = field();
+        let part = curves.part_mut(Kind::Curves).unwrap();
+        for (cv, p) in part.edit(P).unwrap().iter_mut().enumerate() {
+            p[0] += (0.002 * (cv / 5) as f64 * gust) as f32 * p[1];
+        }
+        part.set(Attr::<i32>::element("tuft"), vec![-1, 6, 6, 6, -1, 0, 0, 1, 2]).unwrap();
+        curves
+    };
+    let at = |bench: Bench| {
+        let out = bench.at(9.0).cook();
+        let incoming = moving(Frame::whole(9));
+        let (now, target) = (out.curves().positions().to_vec(), incoming.curves().unwrap().positions().to_vec());
+        assert!(length_error(out.curves(), incoming.curves().unwrap()) < 1e-6);
+        now.iter().zip(target).map(|(a, b)| f64::from(a[0]) - f64::from(b[0])).collect::<Vec<f64>>()
+    };
+    let jiggled = || bench(&NODE).moving(CURVES, moving);
+    let (own, together) = (at(jiggled()), at(jiggled().set(CLUMP, "tuft".into())));
+    assert!(own[14].abs() > 2e-4, "{}", own[14]);
+    for cv in 0..45 {
+        let expected = if (5..20).contains(&cv) { own[10 + cv % 5] } else { own[cv] };
+        // Restoring lengths turns segments that lean differently by second order.
+        assert!((25..35).contains(&cv) || (together[cv] - expected).abs() < 2e-6, "CV {cv}: {}", together[cv]);
+    }
+    assert_eq!(at(jiggled().set(CLUMP, "tuft".into()).set(CLUMP_BLEND, 0.0.into())), own);
+    // Found by radius: roots are 3 m apart, so all curves are one clump or none.
+    assert_eq!(at(jiggled().set(CLUMP_RADIUS, 2.9)), own);
+    let all = at(jiggled().set(CLUMP_RADIUS, 20.0));
+    assert!((0..45).all(|cv| (all[cv] - own[20 + cv % 5]).abs() < 2e-6), "the mean of 0…8 is 4");
+}
+
+#[test]
+fn inherited_motion_may_be_masked_at_the_roots() {
+    let mut rest = field();
+    let part = rest.part_mut(Kind::Curves).unwrap();
+    part.set(Attr::<f32>::element("rides"), (0..9).map(|curve| (curve % 2) as f32).collect()).unwrap();
+    let curves = move |frame: Frame| change(&rest, Kind::Curves, |p| rolled(frame.number(), p));
+    let skin = |frame: Frame| change(&ground(), Kind::Mesh, |p| rolled(frame.number(), p));
+    let with = |share: Maskable| {
+        let bench = bench(&NODE).moving(CURVES, curves.clone()).moving(SKIN, skin).set(INHERIT_MOTION, share);
+        bench.at(6.0).cook().curves().positions().to_vec()
+    };
+    let (none, all) = (with(0.0.into()), with(1.0.into()));
+    let mixed = with(Maskable { value: 1.0, attribute: Some("rides".into()) });
+    for curve in 0..9 {
+        let expected = if curve % 2 == 0 { &none } else { &all };
+        assert_eq!(mixed[curve * 5..][..5], expected[curve * 5..][..5], "curve {curve}");
+    }
+    assert!(farthest(&none, &all) > 1e-2);
 }

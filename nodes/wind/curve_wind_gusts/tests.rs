@@ -1,3 +1,7 @@
+//! Gusts along their paths, groups, controls; loops, sides, masks and clumps in a file of their own.
+
+mod loops_and_clumps;
+
 use super::*;
 use conformance::{Bench, BenchResult, bench, conformance};
 use curves::gusts::{ControlShape, outline};
@@ -60,14 +64,15 @@ fn bits(out: &BenchResult) -> Vec<u8> {
 
 /// A Gust_Control as it comes along a wire: a ball or cubes about `centre`.
 fn control(shape: ControlShape, centre: [f32; 3], radius: f32, strength: f32) -> Component {
-    let points = outline(shape, 2.0, 0).iter().map(|p| [0, 1, 2].map(|k| centre[k] + radius * p[k])).collect();
+    let points =
+        outline(shape, [[2.0; 3]; 2], 0).iter().map(|p| [0, 1, 2].map(|k| centre[k] + radius * p[k])).collect();
     let falling = ramp(&[[0.0, 1.0], [1.0, 0.0]]);
     gust_control::component(points, shape, 2.0, strength, &falling).unwrap()
 }
 
 /// Makes a control of what the suite wires into `controls`: its position comes from the points, its numbers from the
 /// attributes, which are random if present.
-fn as_control(_: usize, given: Geometry) -> Geometry {
+fn as_control(wire: usize, given: Geometry) -> Geometry {
     let points = given.points().unwrap();
     let Some((shapes, keys)) = points.get(gust_control::SHAPE).zip(points.get(gust_control::RAMP)) else {
         return given;
@@ -79,6 +84,12 @@ fn as_control(_: usize, given: Geometry) -> Geometry {
     let number = |attribute: Attr<f32>| points.get(attribute).map_or(1.0, |values| values[0]);
     made.set(gust_control::STRENGTH, vec![number(gust_control::STRENGTH); rows]).unwrap();
     made.set(gust_control::OUTER, vec![1.0 + number(gust_control::OUTER); rows]).unwrap();
+    // Every second control has an outer box of its own.
+    for sides in [gust_control::OUTER_BELOW, gust_control::OUTER_ABOVE].into_iter().filter(|_| wire % 2 == 1) {
+        if let Some(values) = points.get(sides) {
+            made.set(sides, vec![values[0].map(|x| 1.0 + x.abs()); rows]).unwrap();
+        }
+    }
     made.set(gust_control::RAMP, (0..rows).map(|row| [[0.0, keys[0][1], 0.0], [1.0, 0.0, 0.0]][row.min(1)]).collect())
         .unwrap();
     made.into()
@@ -130,10 +141,10 @@ fn gusts_add_to_the_base_and_scale_the_incoming_envelope() {
     let gust = single(curves).set(DISTANCE, 3.0).set(FALLOFF, ramp(&[[0.0, 0.25]]));
     let at = |bench: Bench, frame: f64| envelope(&bench.at(frame).cook())[0];
     assert_eq!(at(gust.clone(), 48.0), 0.125);
-    assert_eq!(at(gust.clone().set(BASE, 0.5), 48.0), 0.375);
-    assert_eq!(at(gust.clone().set(BASE, 0.5), 1.0), 0.25);
-    assert_eq!(at(gust.clone().set(BASE, 0.9), 48.0), 0.5, "the sum is clamped to 1");
-    assert_eq!(at(gust.set(NUM_GUSTS, 0).set(BASE, 0.5), 48.0), 0.25);
+    assert_eq!(at(gust.clone().set(BASE, 0.5.into()), 48.0), 0.375);
+    assert_eq!(at(gust.clone().set(BASE, 0.5.into()), 1.0), 0.25);
+    assert_eq!(at(gust.clone().set(BASE, 0.9.into()), 48.0), 0.5, "the sum is clamped to 1");
+    assert_eq!(at(gust.set(NUM_GUSTS, 0).set(BASE, 0.5.into()), 48.0), 0.25);
 }
 
 #[test]
@@ -249,7 +260,7 @@ fn the_launch_plane_depends_on_the_curves_of_the_first_frame_only() {
 #[test]
 fn controls_add_their_ramp_or_subtract_it() {
     let with = |controls: &[Component], base: f32| {
-        let bench = bench(&NODE).input(CURVES, ruler(0.0, 4.0)).set(NUM_GUSTS, 0).set(BASE, base);
+        let bench = bench(&NODE).input(CURVES, ruler(0.0, 4.0)).set(NUM_GUSTS, 0).set(BASE, base.into());
         let bench = controls.iter().fold(bench, |bench, control| bench.input(CONTROLS, control.clone()));
         let out = bench.cook();
         [0, 32, 48, 64, 96].map(|cv| envelope(&out)[cv])
@@ -292,10 +303,10 @@ fn points_that_are_not_a_control_are_refused() {
 #[test]
 fn a_base_of_1_passes_the_envelope_through_and_writes_1_if_it_is_missing() {
     let mut curves = field(3);
-    let out = single(curves.clone()).set(BASE, 1.0).at(20.0).cook();
+    let out = single(curves.clone()).set(BASE, 1.0.into()).at(20.0).cook();
     assert_eq!((envelope(&out), out.metrics["active_gusts"]), (&[1.0; 45][..], 0.0));
     curves.part_mut(Kind::Curves).unwrap().set(ENVELOPE, vec![0.5; 45]).unwrap();
-    let out = single(curves.clone()).set(BASE, 1.0).at(20.0).cook();
+    let out = single(curves.clone()).set(BASE, 1.0.into()).at(20.0).cook();
     let column = |part: &Component| part.table(Owner::Point).column("envelope").unwrap().address();
     assert_eq!(column(out.curves()), column(curves.curves().unwrap()));
 }
@@ -396,17 +407,18 @@ fn outside_a_group_the_envelope_keeps_its_bits() {
 
 #[test]
 fn strength_multiplies_each_influence() {
-    let gust = single(dot(5.0)).set(DISTANCE, 3.0).set(FALLOFF, ramp(&[[0.0, 0.25]])).set(BASE, 0.125);
+    let gust = single(dot(5.0)).set(DISTANCE, 3.0).set(FALLOFF, ramp(&[[0.0, 0.25]])).set(BASE, 0.125.into());
     let at = |bench: Bench| envelope(&bench.at(48.0).cook())[0];
     for (strength, expected) in [(0.0, 0.125), (0.5, 0.25), (1.0, 0.375), (2.0, 0.625), (9.0, 1.0)] {
-        assert_eq!(at(gust.clone().set(STRENGTH, strength)), expected, "{strength}");
+        assert_eq!(at(gust.clone().set(STRENGTH, strength.into())), expected, "{strength}");
     }
     // A control of strength ½ about the CV, full at its centre: 0.125 + 2 · 0.5 · 0.25.
     let by_hand = |strength: f32| {
-        let outline = outline(ControlShape::Sphere, 1.0, 1).into_iter().map(|[x, y, z]| [x + 5.0, y, z]).collect();
+        let outline =
+            outline(ControlShape::Sphere, [[1.0; 3]; 2], 1).into_iter().map(|[x, y, z]| [x + 5.0, y, z]).collect();
         let keys = Ramp::constant(0.25);
         let points = gust_control::component(outline, ControlShape::Sphere, 1.0, 0.5, &keys).unwrap();
-        at(gust.clone().set(NUM_GUSTS, 0).input(CONTROLS, Geometry::from(points)).set(STRENGTH, strength))
+        at(gust.clone().set(NUM_GUSTS, 0).input(CONTROLS, Geometry::from(points)).set(STRENGTH, strength.into()))
     };
     assert_eq!([by_hand(0.0), by_hand(1.0), by_hand(2.0)], [0.125, 0.25, 0.375]);
 }
@@ -426,6 +438,6 @@ fn gust_is_what_scales_the_envelope_which_never_exceeds_1() {
     assert_eq!(felt(Some(0.5)), (0.5, 0.25));
     assert_eq!(felt(Some(8.0)), (0.5, 1.0));
     assert_eq!(felt(Some(-1.0)), (0.5, 0.0));
-    let calm = bench(&NODE).input(CURVES, dot(5.0)).set(BASE, 1.0).cook();
+    let calm = bench(&NODE).input(CURVES, dot(5.0)).set(BASE, 1.0.into()).cook();
     assert_eq!(calm.curves().get(GUST), Some(&[1.0][..]));
 }

@@ -20,10 +20,10 @@ pub(crate) const fn param() -> Param<Name> {
     .fixed()
 }
 
-/// The attributes that a node with a group reads because of it, and writes: for [`Node::attributes`].
-pub(crate) fn attributes(params: &Params, group: Param<Name>) -> [AttrNames; 2] {
-    let named = Some(params.get(group)).filter(|name| !name.is_empty());
-    [AttrNames::These(named.into_iter().collect()), AttrNames::These(Vec::new())]
+/// The attributes that a node reads because params name them, and writes: for [`Node::attributes`].
+pub(crate) fn attributes(params: &Params, names: &[Param<Name>]) -> [AttrNames; 2] {
+    let named = names.iter().map(|param| params.get(*param)).filter(|name| !name.is_empty());
+    [AttrNames::These(named.collect()), AttrNames::These(Vec::new())]
 }
 
 /// The part of some curves that a node acts on.

@@ -3,7 +3,8 @@
 //! A control is a run of points. Its first four are its centre and the ends of its own x, y and z axis, so whatever
 //! moves the points moves the control: a Transform rotates, stretches and shears it, a Merge puts several on one wire.
 //! Each point of a run has `gust_points` (number of points in the run), `gust_shape` (0 sphere, 1 cubes), `gust_outer`
-//! (outer ÷ inner) and `gust_strength`; `gust_ramp` holds the ramp's keys, one per point from the first of the run:
+//! (outer ÷ inner) and `gust_strength`; if its outer box has a size or place of its own, `gust_outer_below` and
+//! `gust_outer_above` (its distances from the centre along the axes ÷ their lengths; 0 if not); `gust_ramp` holds the ramp's keys, one per point from the first of the run:
 //! x, y, and the interpolation (0 linear, 1 smooth, 2 constant). Points beyond the last key repeat it.
 
 use curves::gusts::{AXIS_ROWS, Control, ControlShape};
@@ -14,6 +15,8 @@ use numerics::vector::to_f64;
 pub(crate) const POINTS: Attr<i32> = Attr::point("gust_points");
 pub(crate) const SHAPE: Attr<i32> = Attr::point("gust_shape");
 pub(crate) const OUTER: Attr<f32> = Attr::point("gust_outer");
+pub(crate) const OUTER_BELOW: Attr<[f32; 3]> = Attr::point("gust_outer_below");
+pub(crate) const OUTER_ABOVE: Attr<[f32; 3]> = Attr::point("gust_outer_above");
 pub(crate) const STRENGTH: Attr<f32> = Attr::point("gust_strength");
 pub(crate) const RAMP: Attr<[f32; 3]> = Attr::point("gust_ramp");
 
@@ -47,6 +50,17 @@ pub(crate) fn component(
     points.set(STRENGTH, vec![strength; count])?;
     points.set(RAMP, (0..count).map(key).collect())?;
     Ok(points)
+}
+
+/// Gives a control an outer box of its own: see [`Control::within_box`].
+///
+/// # Errors
+/// None that a user causes.
+pub(crate) fn set_box(points: &mut Component, [below, above]: [[f64; 3]; 2]) -> Result<()> {
+    let count = points.point_count();
+    points.set(OUTER_BELOW, vec![below.map(|x| x as f32); count])?;
+    points.set(OUTER_ABOVE, vec![above.map(|x| x as f32); count])?;
+    Ok(())
 }
 
 /// The controls among the points of wire `wire`, in order.
@@ -94,7 +108,11 @@ pub(crate) fn controls(points: &Component, wire: usize) -> Result<Vec<Control>> 
         })?;
         let centre = to_f64(at[first]);
         let axes = [1, 2, 3].map(|axis| (to_f64(at[first + axis]) - centre).into());
-        controls.push(Control::new(shape, centre.into(), axes, f64::from(outers[first]), ramp, strengths[first]));
+        let control = Control::new(shape, centre.into(), axes, f64::from(outers[first]), ramp, strengths[first]);
+        let sides = |of: Attr<[f32; 3]>| points.get(of).map_or([0.0; 3], |rows| rows[first]);
+        let [below, above] = [OUTER_BELOW, OUTER_ABOVE].map(sides);
+        let has_box = below.iter().chain(&above).all(|side| *side > 0.0);
+        controls.push(if has_box { control.within_box(below.map(f64::from), above.map(f64::from)) } else { control });
         first += count;
     }
     Ok(controls)

@@ -24,6 +24,7 @@ fn bent(root: Point, theta: f64, segments: usize, g: f32, mode: BendMode) -> Vec
         mode,
         blend: 1.0.into(),
         noise: None,
+        gusts: None,
     };
     bend(&[0, segments as u32 + 1], &points, &with).points
 }

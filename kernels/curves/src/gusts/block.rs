@@ -1,8 +1,7 @@
 //! A block of points, sixteen at a time: the influences of all nearby regions, summed in order.
 
-use super::control::Local;
 use super::cull::{Bounds, Boxes};
-use super::{BLOCK, LUMPS, Prepared, Sphere};
+use super::{BLOCK, LUMPS, Prepared, Sphere, at_least_0};
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::noise;
 use numerics::simd::kernel;
@@ -15,21 +14,42 @@ const LEAST_LEFT: f32 = 1e-3;
 const OFF_LATTICE: Vec3 = [0.37, 0.61, 0.13];
 
 /// Groups of sixteen points in a block.
-const ROWS: usize = BLOCK / LANES;
+pub(super) const ROWS: usize = BLOCK / LANES;
 
 kernel! {
-    /// Writes the values of up to [`BLOCK`] points within `bounds`, which the regions of `near` may reach, to `out`;
-    /// returns how many points any influence reaches.
-    pub(super) fn block_values(prepared: &Prepared<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3], out: &mut [f32]) -> usize = body;
+    /// Adds the influences of the regions of `near`, which may reach up to [`BLOCK`] points within `bounds`, times
+    /// `factors` to `out`; returns how many points any influence reaches.
+    pub(super) fn block_values(
+        prepared: &Prepared<'_>,
+        near: &Boxes,
+        bounds: &Bounds,
+        points: &[Vec3],
+        factors: Option<&[f32]>,
+        out: &mut [f32],
+    ) -> usize = body;
 }
 
 #[inline(always)]
-fn body(prepared: &Prepared<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3], out: &mut [f32]) -> usize {
+fn body(
+    prepared: &Prepared<'_>,
+    near: &Boxes,
+    bounds: &Bounds,
+    points: &[Vec3],
+    factors: Option<&[f32]>,
+    out: &mut [f32],
+) -> usize {
     let spheres = prepared.gusts.spheres;
     let rows = points.len().div_ceil(LANES);
     let origin = points[0];
     let mut at = [[F32x16::splat(0.0); 3]; ROWS];
-    let mut sums = [Sum { value: F32x16::splat(prepared.gusts.base), reached: [0; LANES] }; ROWS];
+    let mut sums = [Sum { value: F32x16::splat(0.0), reached: [0; LANES] }; ROWS];
+    for (out, sum) in out.chunks(LANES).zip(&mut sums) {
+        // Lanes without a point repeat the last.
+        for lane in 0..LANES {
+            sum.value.0[lane] = out[lane.min(out.len() - 1)];
+        }
+    }
+    let scales = scales(factors, points.len());
     let mut loaded = false;
     for first in (0..near.len()).step_by(LANES) {
         let met = near.meet(first, bounds);
@@ -47,7 +67,12 @@ fn body(prepared: &Prepared<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3],
                     let ball = Ball::of(sphere, origin);
                     for row in 0..rows {
                         if let Some(share) = ball.share(&at[row]) {
-                            sums[row].add(&share, &prepared.falloff.eval(&share), ball.strength);
+                            sums[row].add(
+                                &share,
+                                &prepared.falloff.eval(&share),
+                                ball.strength,
+                                scale_of(scales.as_ref(), row),
+                            );
                         }
                     }
                 }
@@ -55,7 +80,10 @@ fn body(prepared: &Prepared<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3],
                     let index = region - spheres.len();
                     let local = prepared.gusts.controls[index].local(origin);
                     for row in 0..rows {
-                        add_control(&mut sums[row], &local, prepared, index, &at[row]);
+                        let share = local.share(&at[row]);
+                        let influence = prepared.ramps[index].eval(&share);
+                        let strength = prepared.gusts.controls[index].strength();
+                        sums[row].add(&share, &influence, strength, scale_of(scales.as_ref(), row));
                     }
                 }
             }
@@ -76,7 +104,7 @@ fn body(prepared: &Prepared<'_>, near: &Boxes, bounds: &Bounds, points: &[Vec3],
 
 /// The points relative to `origin`; the last one is repeated to fill its row.
 #[inline(always)]
-fn load(points: &[Vec3], origin: Vec3, at: &mut [Lanes<3>; ROWS]) {
+pub(super) fn load(points: &[Vec3], origin: Vec3, at: &mut [Lanes<3>; ROWS]) {
     for (points, at) in points.chunks(LANES).zip(at) {
         for lane in 0..LANES {
             set(at, lane, vector::sub(points[lane.min(points.len() - 1)], origin));
@@ -85,9 +113,24 @@ fn load(points: &[Vec3], origin: Vec3, at: &mut [Lanes<3>; ROWS]) {
 }
 
 #[inline(always)]
-fn add_control(sum: &mut Sum, local: &Local, prepared: &Prepared<'_>, index: usize, at: &Lanes<3>) {
-    let share = local.share(at);
-    sum.add(&share, &prepared.ramps[index].eval(&share), prepared.gusts.controls[index].strength());
+pub(super) fn scale_of(scales: Option<&[F32x16; ROWS]>, row: usize) -> Option<&F32x16> {
+    match scales {
+        Some(scales) => Some(&scales[row]),
+        None => None,
+    }
+}
+
+/// The factors of a block's points in rows.
+#[inline(always)]
+pub(super) fn scales(factors: Option<&[f32]>, points: usize) -> Option<[F32x16; ROWS]> {
+    let factors = factors?;
+    let mut rows = [F32x16::splat(0.0); ROWS];
+    for row in 0..points.div_ceil(LANES) {
+        for lane in 0..LANES {
+            rows[row].0[lane] = at_least_0(factors[(row * LANES + lane).min(points - 1)]);
+        }
+    }
+    Some(rows)
 }
 
 /// Clamped to 0..1; NaN, the sum of opposite infinities, gives 0.
@@ -106,12 +149,16 @@ struct Sum {
 }
 
 impl Sum {
-    /// Adds `influence` × `strength` if `share` lies within the boundary.
+    /// Adds `influence` × `strength` × `scale` if `share` lies within the boundary.
     #[inline(always)]
-    fn add(&mut self, share: &F32x16, influence: &F32x16, strength: f32) {
+    fn add(&mut self, share: &F32x16, influence: &F32x16, strength: f32, scale: Option<&F32x16>) {
         for lane in 0..LANES {
             let influence = influence.0[lane] * strength;
             let influence = if share.0[lane] < 1.0 { influence } else { 0.0 };
+            let influence = match scale {
+                Some(scale) => influence * scale.0[lane],
+                None => influence,
+            };
             self.value.0[lane] += influence;
             self.reached[lane] |= u32::from(influence != 0.0);
         }
@@ -129,18 +176,18 @@ impl Sum {
 }
 
 /// A sphere relative to a nearby point.
-struct Ball {
+pub(super) struct Ball {
     centre: Vec3,
     /// One over the radius.
     inverse: f32,
-    strength: f32,
+    pub(super) strength: f32,
     noise: f32,
     salt: u32,
 }
 
 impl Ball {
     #[inline(always)]
-    fn of(sphere: &Sphere, origin: Vec3) -> Self {
+    pub(super) fn of(sphere: &Sphere, origin: Vec3) -> Self {
         Self {
             centre: to_f32(DVec3::from(sphere.centre) - to_f64(origin)),
             inverse: 1.0 / sphere.radius,
@@ -152,7 +199,7 @@ impl Ball {
 
     /// Distances of points, from the centre (0) to the boundary (1); `None` if all are outside.
     #[inline(always)]
-    fn share(&self, at: &Lanes<3>) -> Option<F32x16> {
+    pub(super) fn share(&self, at: &Lanes<3>) -> Option<F32x16> {
         let mut away = [F32x16::splat(0.0); 3];
         let mut share = F32x16::splat(0.0);
         let mut inside = 0;

@@ -4,7 +4,8 @@
 //! centre to 1 at the boundary, where the influence ends:
 //! * sphere: |q|;
 //! * cubes: with m = max |qᵢ|, so that level sets are cubes, m/2 up to the inner boundary m = 1, and
-//!   ½ + ½·(m − 1)/(outer − 1) from there to the outer one, m = outer.
+//!   ½ + ½·max (|qᵢ| − 1)/(outerᵢ − 1) from there to the outer one, where some |qᵢ| is `outerᵢ`. Each of its six sides may
+//!   have its own distance `outerᵢ` from the centre; level sets are then boxes.
 //!
 //! A control without volume (a scale of 0 along an axis) reaches nothing.
 
@@ -31,7 +32,8 @@ pub struct Control {
     shape: ControlShape,
     centre: DVec3,
     axes: [DVec3; 3],
-    outer: f64,
+    /// Distances of the outer box's sides from the centre along the axes: below and above, 1 or more.
+    outer: [DVec3; 2],
     ramp: Ramp,
     strength: f32,
     /// The matrix from the scene to the control's own space, row by row; `None` if it is flat.
@@ -49,9 +51,17 @@ impl Control {
         ramp: Ramp,
         strength: f32,
     ) -> Self {
-        let outer = if outer > 1.0 { outer } else { 1.0 };
         let axes = axes.map(DVec3::from);
+        let outer = [DVec3::repeat(at_least_1(outer)); 2];
         Self { shape, centre: centre.into(), axes, outer, ramp, strength, inverse: inverse(axes) }
+    }
+
+    /// The control with an outer box of its own, whose sides lie at −`below[k]` and `above[k]` along its axes, in lengths of
+    /// these; less than 1 counts as 1.
+    #[must_use]
+    pub fn within_box(mut self, below: [f64; 3], above: [f64; 3]) -> Self {
+        self.outer = [below, above].map(|sides| DVec3::from(sides.map(at_least_1)));
+        self
     }
 
     /// The control with its influence multiplied.
@@ -79,7 +89,8 @@ impl Control {
         let ends = |axis: usize| DVec3::from(self.axes.map(|end| end[axis]));
         let extent = |axis: usize| match self.shape {
             ControlShape::Sphere => ends(axis).norm(),
-            ControlShape::Cubes => self.outer * ends(axis).abs().sum(),
+            // About the centre, so that an outer box that is not is enclosed, too.
+            ControlShape::Cubes => ends(axis).abs().dot(&self.outer[0].sup(&self.outer[1])),
         };
         Some(DVec3::new(extent(0), extent(1), extent(2)))
     }
@@ -97,7 +108,7 @@ impl Control {
             shape: self.shape,
             centre: to_f32(self.centre - to_f64(origin)),
             rows: inverse.map(to_f32),
-            beyond: (0.5 / (self.outer - 1.0)) as f32,
+            beyond: self.outer.map(|sides| to_f32(sides.map(|side| 0.5 / (side - 1.0)))),
         }
     }
 }
@@ -107,8 +118,9 @@ pub(super) struct Local {
     shape: ControlShape,
     centre: Vec3,
     rows: [Vec3; 3],
-    /// Increase of the share per unit beyond the inner cube; infinite if both cubes are the same.
-    beyond: f32,
+    /// Increase of the share per unit beyond the inner cube, below and above the centre along each axis; infinite where the
+    /// outer box ends there, too.
+    beyond: [Vec3; 2],
 }
 
 impl Local {
@@ -134,16 +146,26 @@ impl Local {
             }
             ControlShape::Cubes => {
                 for lane in 0..LANES {
-                    let [x, y, z] = [own[0].0[lane].abs(), own[1].0[lane].abs(), own[2].0[lane].abs()];
-                    let most = if x > y { x } else { y };
-                    let most = if most > z { most } else { z };
-                    let outside = 0.5 + (most - 1.0) * self.beyond;
-                    share.0[lane] = if most > 1.0 { outside } else { 0.5 * most };
+                    let (mut most, mut outside) = (0.0, 0.0);
+                    for axis in 0..3 {
+                        let along = own[axis].0[lane];
+                        let size = along.abs();
+                        let beyond = if along < 0.0 { self.beyond[0][axis] } else { self.beyond[1][axis] };
+                        // Within the inner cube's range infinity times 0 does not count.
+                        let past = if size > 1.0 { (size - 1.0) * beyond } else { 0.0 };
+                        most = if size > most { size } else { most };
+                        outside = if past > outside { past } else { outside };
+                    }
+                    share.0[lane] = if most > 1.0 { 0.5 + outside } else { 0.5 * most };
                 }
             }
         }
         share
     }
+}
+
+fn at_least_1(side: f64) -> f64 {
+    if side > 1.0 { side } else { 1.0 }
 }
 
 /// The inverse of the matrix whose columns are `axes`, row by row; `None` if they span no volume.
@@ -169,15 +191,15 @@ pub const AXIS_ROWS: usize = 4;
 const CIRCLE: usize = 32;
 const EDGE: usize = 6;
 
-/// Points that draw a control in its own space: [`AXIS_ROWS`], then a sphere's three great circles or the edges of both
-/// cubes. At least `least` points.
-pub fn outline(shape: ControlShape, outer: f64, least: usize) -> Vec<[f32; 3]> {
+/// Points that draw a control in its own space: [`AXIS_ROWS`], then a sphere's three great circles or the edges of the
+/// inner cube and of the outer box, from −`outer[0]` to `outer[1]`. At least `least` points.
+pub fn outline(shape: ControlShape, outer: [[f64; 3]; 2], least: usize) -> Vec<[f32; 3]> {
     let mut points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     match shape {
         ControlShape::Sphere => circles(CIRCLE.max(least.div_ceil(3)), &mut points),
         ControlShape::Cubes => {
             let edge = EDGE.max(least.div_ceil(24));
-            edges(1.0, edge, &mut points);
+            edges([[1.0; 3]; 2], edge, &mut points);
             edges(outer, edge, &mut points);
         }
     }
@@ -197,15 +219,17 @@ fn circles(count: usize, points: &mut Vec<[f32; 3]>) {
     }
 }
 
-/// The twelve edges of a cube of this half size, with both corners of each.
-fn edges(half: f64, count: usize, points: &mut Vec<[f32; 3]>) {
+/// The twelve edges of a box from −`sides[0]` to `sides[1]`, with both corners of each.
+fn edges([below, above]: [[f64; 3]; 2], count: usize, points: &mut Vec<[f32; 3]>) {
     for axis in 0..3 {
+        let [middle, half] = [above[axis] - below[axis], above[axis] + below[axis]].map(|x| 0.5 * x);
         for corner in 0..4 {
             for k in 0..count {
                 let mut point = [0.0; 3];
-                point[axis] = (half * (2.0 * k as f64 / (count - 1) as f64 - 1.0)) as f32;
-                point[(axis + 1) % 3] = if corner & 1 == 0 { -half } else { half } as f32;
-                point[(axis + 2) % 3] = if corner & 2 == 0 { -half } else { half } as f32;
+                point[axis] = (middle + half * (2.0 * k as f64 / (count - 1) as f64 - 1.0)) as f32;
+                for (bit, across) in [(1, (axis + 1) % 3), (2, (axis + 2) % 3)] {
+                    point[across] = if corner & bit == 0 { -below[across] } else { above[across] } as f32;
+                }
                 points.push(point);
             }
         }

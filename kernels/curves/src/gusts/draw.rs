@@ -26,6 +26,17 @@ pub struct Draw {
     pub decay: [f64; 2],
     /// Frames from a round to the next; below [`SHORTEST_ROUND`] there is one round only.
     pub repeat: f64,
+    /// Number of rounds after which the same random numbers come again; 0: never.
+    pub period: u32,
+}
+
+impl Draw {
+    /// The same gusts, all of whose rounds come again every `frames`: with `repeat` as many rounds as fit best, else one.
+    #[must_use]
+    pub fn looped(self, frames: f64) -> Self {
+        let fit = if self.repeat < SHORTEST_ROUND { 1.0 } else { (frames / self.repeat).round().clamp(1.0, 1e9) };
+        Self { repeat: frames / fit, period: fit as u32, ..self }
+    }
 }
 
 /// The shortest time from a round to the next, in frames: the finest step that frames can take.
@@ -51,6 +62,8 @@ pub struct Gust {
     pub position: [f64; 2],
     /// Seed of its noise.
     pub salt: u32,
+    /// Where across the wind it blows besides: a fraction of a revolution, 0..1.
+    pub side: f64,
 }
 
 /// All gusts alive at a moment, ordered by index, then by round.
@@ -76,6 +89,7 @@ enum Draws {
     Across,
     Up,
     Salt,
+    Side,
 }
 
 impl Draw {
@@ -91,7 +105,8 @@ impl Draw {
             living.dropped = living.dropped.saturating_add(kept.abs_diff(first));
             for round in kept..=last {
                 let start = if round == 0 { start } else { start + round as f64 * self.repeat };
-                let key = key.of(Draws::Round as u64).of(round as u64);
+                let drawn = if self.period > 0 { round.rem_euclid(i64::from(self.period)) } else { round };
+                let key = key.of(Draws::Round as u64).of(drawn as u64);
                 living.gusts.extend(self.gust(key, start, frame));
             }
         }
@@ -126,6 +141,7 @@ impl Draw {
             speed: of(Draws::Speed).f64(),
             position: [side(Draws::Across), side(Draws::Up)],
             salt: of(Draws::Salt).u32(),
+            side: of(Draws::Side).f64(),
         })
     }
 }

@@ -8,6 +8,8 @@ pub struct Plane {
     centre: DVec3,
     /// From the centre to the side, and to the upper edge.
     half: [DVec3; 2],
+    /// The same directions, of length 1.
+    sides: [DVec3; 2],
 }
 
 /// Cosine of the angle to the vertical beyond which a wind has no well-defined upward side.
@@ -26,11 +28,17 @@ impl Plane {
         let up = wind.cross(&across);
         let side = |direction: DVec3, size: f64| direction * if size > 0.0 { 0.5 * size } else { extent(direction) };
         let upwind = extent(wind) + distance;
-        Self { centre: centre - wind * upwind, half: [side(across, area[0]), side(up, area[1])] }
+        Self { centre: centre - wind * upwind, half: [side(across, area[0]), side(up, area[1])], sides: [across, up] }
     }
 
     /// The point at `position` of the rectangle, −1..1 along each side.
     pub fn at(&self, position: [f64; 2]) -> [f64; 3] {
         (self.centre + self.half[0] * position[0] + self.half[1] * position[1]).into()
+    }
+
+    /// The direction in the rectangle at this fraction of a revolution from its first side to its second, of length 1.
+    pub fn direction(&self, revolution: f64) -> [f64; 3] {
+        let angle = std::f64::consts::TAU * revolution;
+        (self.sides[0] * libm::cos(angle) + self.sides[1] * libm::sin(angle)).into()
     }
 }

@@ -17,10 +17,11 @@ mod cull;
 mod draw;
 mod launch;
 mod profile;
+mod shear;
 
 use block::block_values;
 pub use control::{AXIS_ROWS, Control, ControlShape, outline};
-use cull::{Boxes, NOWHERE, bounds_of, join, meeting};
+use cull::{Bounds, Boxes, NOWHERE, bounds_of, join, meeting};
 pub use draw::{Draw, Gust, Living, MOST_LIVING};
 pub use launch::Plane;
 use numerics::parallel;
@@ -28,6 +29,7 @@ use numerics::ramp::Ramp;
 use numerics::simd::Path;
 use numerics::vector::DVec3;
 use profile::Profile;
+pub use shear::{sideways, sideways_on};
 
 /// A procedural gust at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,8 +57,29 @@ pub struct Gusts<'a> {
     pub spheres: &'a [Sphere],
     /// Regions placed by hand.
     pub controls: &'a [Control],
+    /// Factors of single points.
+    pub masks: GustMasks<'a>,
     /// Factor on each point's value: below 0 or NaN counts as 0; `None` is 1 everywhere.
     pub incoming: Option<&'a [f32]>,
+}
+
+/// Factors, one for each point; below 0 or NaN counts as 0, `None` is 1 everywhere.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GustMasks<'a> {
+    /// On `base`; products above 1 count as 1.
+    pub base: Option<&'a [f32]>,
+    /// On every influence.
+    pub strength: Option<&'a [f32]>,
+}
+
+impl GustMasks<'_> {
+    /// None.
+    pub const NONE: Self = Self { base: None, strength: None };
+
+    /// Those of the points from `first` on.
+    fn from(&self, first: usize) -> Self {
+        Self { base: self.base.map(|mask| &mask[first..]), strength: self.strength.map(|mask| &mask[first..]) }
+    }
 }
 
 /// The values of all points.
@@ -87,7 +110,7 @@ const MARGIN: f64 = 1e-4;
 /// The value of each point.
 ///
 /// # Panics
-/// If `incoming` is shorter than `points`.
+/// If `incoming` or a mask is shorter than `points`.
 pub fn evaluate(points: &[[f32; 3]], gusts: &Gusts<'_>) -> Influence {
     evaluate_on(Path::chosen(), points, gusts)
 }
@@ -98,11 +121,16 @@ pub fn evaluate(points: &[[f32; 3]], gusts: &Gusts<'_>) -> Influence {
 /// As [`evaluate()`].
 pub fn evaluate_on(path: Path, points: &[[f32; 3]], gusts: &Gusts<'_>) -> Influence {
     let prepared = Prepared::new(gusts);
-    let mut values = vec![prepared.gusts.base.clamp(0.0, 1.0); points.len()];
+    let base = gusts.base.clamp(0.0, 1.0);
+    let mut values = match gusts.masks.base {
+        Some(mask) => mask[..points.len()].iter().map(|factor| (base * at_least_0(*factor)).min(1.0)).collect(),
+        None => vec![base; points.len()],
+    };
     let tasks = values.chunks_mut(TASK).zip(points.chunks(TASK));
     let reached = parallel::map(tasks, |task, (out, points)| {
         let incoming = gusts.incoming.map(|incoming| &incoming[task * TASK..][..points.len()]);
-        let reached = if prepared.boxes.len() > 0 { prepared.task(path, points, out) } else { 0 };
+        let factors = gusts.masks.from(task * TASK).strength;
+        let reached = if prepared.boxes.len() > 0 { prepared.task(path, points, factors, out) } else { 0 };
         if let Some(incoming) = incoming {
             scale(out, incoming);
         }
@@ -145,18 +173,24 @@ impl<'a> Prepared<'a> {
         Self { gusts, falloff: Profile::new(gusts.falloff), ramps, boxes, only_adds }
     }
 
-    /// Writes the values of a task's points; returns how many of them any influence reaches.
-    fn task(&self, path: Path, points: &[[f32; 3]], out: &mut [f32]) -> usize {
+    /// The bounds of a task's blocks of points, and the regions that may reach any of them.
+    fn near(&self, path: Path, points: &[[f32; 3]]) -> ([Bounds; TASK / BLOCK], Boxes) {
         let mut bounds = [NOWHERE; TASK / BLOCK];
         let mut whole = NOWHERE;
         for (points, bounds) in points.chunks(BLOCK).zip(&mut bounds) {
             *bounds = bounds_of(path, points);
             whole = join(whole, *bounds);
         }
-        let near = meeting(path, &self.boxes, &whole);
+        (bounds, meeting(path, &self.boxes, &whole))
+    }
+
+    /// Adds to the values of a task's points, which are their `base`; returns how many of them any influence reaches.
+    fn task(&self, path: Path, points: &[[f32; 3]], factors: Option<&[f32]>, out: &mut [f32]) -> usize {
+        let (bounds, near) = self.near(path, points);
         let mut reached = 0;
         for (block, (points, out)) in points.chunks(BLOCK).zip(out.chunks_mut(BLOCK)).enumerate() {
-            reached += block_values(path, self, &near, &bounds[block], points, out);
+            let factors = factors.map(|factors| &factors[block * BLOCK..]);
+            reached += block_values(path, self, &near, &bounds[block], points, factors, out);
         }
         reached
     }
@@ -165,9 +199,16 @@ impl<'a> Prepared<'a> {
 /// Multiplies values by those incoming, of which below 0 or NaN counts as 0; none is above 1 then.
 pub fn scale(values: &mut [f32], incoming: &[f32]) {
     for (value, incoming) in values.iter_mut().zip(incoming) {
-        *value *= if *incoming > 0.0 { *incoming } else { 0.0 };
+        *value *= at_least_0(*incoming);
         *value = if *value > 1.0 { 1.0 } else { *value };
     }
+}
+
+/// The number; below 0 or NaN counts as 0, infinity as the largest, whose product with 0 is 0.
+#[inline(always)]
+fn at_least_0(factor: f32) -> f32 {
+    let factor = if factor > 0.0 { factor } else { 0.0 };
+    if factor < f32::MAX { factor } else { f32::MAX }
 }
 
 #[cfg(test)]

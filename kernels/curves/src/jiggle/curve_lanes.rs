@@ -89,6 +89,12 @@ impl CurveLanes {
         std::array::from_fn(|lane| self.last[lane].min(self.first[lane] + step as u32) as usize)
     }
 
+    /// The lanes that have a CV at `step`, with its index.
+    pub(super) fn cvs(&self, step: usize) -> impl Iterator<Item = (usize, usize)> {
+        let lanes = (0..LANES).filter(move |lane| (step as u32) < self.count[*lane]);
+        lanes.map(move |lane| (lane, self.first[lane] as usize + step))
+    }
+
     /// Writes the CVs of the lanes to `out`, whose first point has index `base`.
     #[inline(always)]
     fn write(&self, step: usize, points: &Lanes<3>, base: usize, out: &mut [Vec3]) {

@@ -11,6 +11,7 @@
 //! hertz, seconds.
 
 mod curve_lanes;
+mod gather;
 mod lengths;
 mod response;
 mod rigid_step;
@@ -19,13 +20,14 @@ pub use lengths::with_lengths_between;
 pub use response::{Drag, steps_to_forget};
 pub use rigid_step::RigidStep;
 
+use crate::clumps::Clumps;
 use curve_lanes::{CurveLanes, CvState, Responses, shape_lanes, step_lanes};
 use numerics::lanes::{F64x16, LANES};
 use numerics::masked::Masked;
 use numerics::parallel;
 use numerics::ramp::Ramp;
 use numerics::simd::Path;
-use numerics::vector::{Vec3, to_f64};
+use numerics::vector::{DVec3, Vec3, to_f64};
 use response::Response;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -208,6 +210,33 @@ impl Jiggle {
         JiggledCurves { points, max_offset: farthest.sqrt() }
     }
 
+    /// [`Jiggle::shape`] of curves that are drawn together by `share`, 0..1: from their own swing towards the mean swing of
+    /// their clump at the same fraction of their length.
+    ///
+    /// # Panics
+    /// If a mask is shorter than the points, or there are fewer curves in the clumps.
+    pub fn shape_clumped(&self, blend: Masked<'_, f32>, clumps: &Clumps, share: Masked<'_, f32>) -> JiggledCurves {
+        let mut offsets = vec![DVec3::zeros(); self.along.len()];
+        for (curves, step, state) in self.batches.iter().flat_map(CurveBatch::steps) {
+            for (lane, cv) in curves.cvs(step) {
+                offsets[cv] = [0, 1, 2].map(|axis: usize| state.offset[axis].0[lane]).into();
+            }
+        }
+        let offsets = gather::gathered(&self.starts, &self.along, &offsets, clumps, share);
+        let mut together = self.clone();
+        for batch in &mut together.batches {
+            let steps = batch.groups.iter().flat_map(|curves| (0..curves.longest).map(move |step| (curves, step)));
+            for ((curves, step), state) in steps.zip(&mut batch.states) {
+                for (lane, cv) in curves.cvs(step) {
+                    for axis in 0..3 {
+                        state.offset[axis].0[lane] = offsets[cv][axis];
+                    }
+                }
+            }
+        }
+        together.shape(blend)
+    }
+
     /// Recomputes the responses if they are not those of `spring` and `dt`.
     fn update_responses(&mut self, spring: &Spring<'_>, dt: f64) {
         if self.response_key.as_ref().is_some_and(|key| key.is(spring, dt)) {
@@ -240,6 +269,12 @@ impl Jiggle {
 }
 
 impl CurveBatch {
+    /// Each step of its groups, with the state there.
+    fn steps(&self) -> impl Iterator<Item = (&CurveLanes, usize, &CvState)> {
+        let steps = self.groups.iter().flat_map(|curves| (0..curves.longest).map(move |step| (curves, step)));
+        steps.zip(&self.states).map(|((curves, step), state)| (curves, step, state))
+    }
+
     fn at_rest(starts: &[u32], range: Range<usize>, targets: &[Vec3]) -> Self {
         let points = starts[range.start] as usize..starts[range.end] as usize;
         let groups: Vec<CurveLanes> = range.step_by(LANES).map(|first| CurveLanes::new(starts, first)).collect();

@@ -31,9 +31,26 @@ impl RigidStep {
     /// # Panics
     /// If there are fewer poses than roots.
     pub fn all_between(binding: &SkinBinding, from: &[RootPose], to: &[RootPose], share: f64) -> Vec<Self> {
+        Self::tabulated(binding, from, to, |_| share)
+    }
+
+    /// The same with a share for each root.
+    ///
+    /// # Panics
+    /// If there are fewer poses or shares than roots.
+    pub fn each_between(binding: &SkinBinding, from: &[RootPose], to: &[RootPose], shares: &[f64]) -> Vec<Self> {
+        Self::tabulated(binding, from, to, |root| shares[root])
+    }
+
+    fn tabulated(
+        binding: &SkinBinding,
+        from: &[RootPose],
+        to: &[RootPose],
+        share: impl Fn(usize) -> f64 + Sync,
+    ) -> Vec<Self> {
         let roots: Vec<DVec3> = binding.roots().collect();
         let mut steps = vec![Self::NONE; roots.len()];
-        parallel::fill(&mut steps, TASK, |root| Self::between(roots[root], &from[root], &to[root], share));
+        parallel::fill(&mut steps, TASK, |root| Self::between(roots[root], &from[root], &to[root], share(root)));
         steps
     }
 

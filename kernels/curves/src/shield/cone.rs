@@ -7,12 +7,15 @@
 //! area. When an edge crosses the centre, both terms jump by opposite amounts, and an edge contributes nothing when it
 //! enters the disc, so the mean is continuous in the wind.
 //!
+//! Where shelter fades with distance, the value at the centre has the weight of its distance and each edge that of its
+//! nearest point: exact for a surface across the wind that covers the disc, continuous always.
+//!
 //! Front and back faces are counted separately; the larger mean is taken, at most 1. That is exact if the visible
 //! surface is one layer or covers the whole disc, and an upper bound if layers overlap partly.
 
-use super::Obstacle;
 use super::rays::{Seen, beside};
 use super::views::View;
+use super::{Obstacle, Reach};
 use numerics::lanes::{F32x16, LANES, Lanes, get};
 use numerics::simd::kernel;
 use numerics::tree::{Boxes, Region};
@@ -39,19 +42,20 @@ kernel! {
     pub(super) fn cover(
         obstacles: &[Obstacle],
         views: &[View],
-        reach: f32,
+        reach: Reach,
         cone: f32,
         covered: &mut [f32],
     ) = body;
 }
 
 #[inline(always)]
-fn body(obstacles: &[Obstacle], views: &[View], reach: f32, cone: f32, covered: &mut [f32]) {
+fn body(obstacles: &[Obstacle], views: &[View], reach: Reach, cone: f32, covered: &mut [f32]) {
     let (sine, cosine) = trig::sin_cos(cone);
     for (view, covered) in views.iter().zip(covered) {
         let mut sums = [F32x16::splat(0.0); 2];
         for obstacle in obstacles {
-            let cone = Cone { at: view.at, slope: sine / cosine, reach, gap: view.gap.at(obstacle.size) };
+            let gap = view.gap.at(obstacle.size);
+            let cone = Cone { at: view.at, slope: sine / cosine, reach, farthest: reach.farthest(), gap };
             cone.look(obstacle, &mut sums);
         }
         let (mut front, mut back) = (0.0, 0.0);
@@ -71,7 +75,9 @@ struct Cone {
     at: Vec3,
     /// Radius ÷ distance.
     slope: f32,
-    reach: f32,
+    reach: Reach,
+    /// Beyond this distance nothing counts.
+    farthest: f32,
     gap: f32,
 }
 
@@ -155,12 +161,17 @@ impl Cone {
         (area > 0.0) & (volume.abs() > self.gap * area)
     }
 
-    /// The fraction of the wind that is stopped by a surface at a distance: 1 except near the end of the offset.
+    /// The fraction of the wind that is stopped by a surface at a distance: 1 except near the end of the offset, unless
+    /// it fades.
     #[inline(always)]
     fn weight(&self, distance: f32) -> f32 {
-        let weight = (1.0 - distance / self.reach) * (1.0 / FADE);
+        let weight = (1.0 - distance / self.reach.end) * (1.0 / FADE);
         let weight = if weight > 0.0 { weight } else { 0.0 };
-        if weight < 1.0 { weight } else { 1.0 }
+        let weight = if weight < 1.0 { weight } else { 1.0 };
+        match self.reach.fade {
+            Some(fade) => weight * fade.weight(distance),
+            None => weight,
+        }
     }
 
     /// Contribution of an edge to the mean over the disc: an integral over the part of it inside the disc, as seen from
@@ -238,7 +249,7 @@ impl Region for &Cone {
             let near = boxes.low[2].0[lane] - self.at[2];
             // A little wider than the cone, to allow for rounding and `ASIDE`.
             let radius = self.slope * 1.001 * far;
-            let meets = (far > 0.0) & (near <= self.reach) & (square <= radius * radius);
+            let meets = (far > 0.0) & (near <= self.farthest) & (square <= radius * radius);
             mask |= u16::from(meets) << lane;
         }
         mask

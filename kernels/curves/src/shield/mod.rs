@@ -8,6 +8,8 @@
 //! that share points, and are stopped by either side of a face. The covered fraction of a cone is a continuous function
 //! of the wind. The same bits on every SIMD path and number of threads; finite for any input.
 //!
+//! Shelter may fade with the distance of what is hit ([`Shield::distance`]); of several hits the nearest counts.
+//!
 //! A CV on the skin is not sheltered by the triangles it lies on: those whose *plane* is closer than the gap. So a root
 //! on the windward side of a closed skin is exposed, and one on the lee side is sheltered by the opposite side of the
 //! skin, at any angle of the wind. Limit: a root buried deeper than the gap is covered by the skin above it.
@@ -25,6 +27,7 @@ use numerics::lanes::{F32x16, LANES, get};
 use numerics::parallel;
 use numerics::simd::Path;
 use numerics::tree::{Block, TriangleTree};
+use numerics::trig;
 use numerics::vector::{self, Vec3};
 use views::Views;
 
@@ -55,11 +58,53 @@ pub struct Shield {
     pub wind: [f64; 3],
     /// Largest distance upwind at which a collider shelters a CV, metres.
     pub offset: f32,
+    /// A hit at a distance s counts max(0, 1 − s ÷ distance) to the power of `falloff`; 0: it counts 1 at any.
+    pub distance: f32,
+    /// See `distance`; 0 or more.
+    pub falloff: f32,
     /// Half the opening angle of the cone, radians, 0…0.5; 0 is a ray.
     pub cone: f32,
     /// A CV this close to a triangle's plane lies on it, metres. At least the smaller of 1e-5 of the collider's size
     /// and 1e-2 of the curve's, and 4 ulp of the CV's largest coordinate.
     pub skin_gap: f32,
+}
+
+/// How shelter fades with the distance of what is hit, in the units of the frame.
+#[derive(Clone, Copy)]
+struct Fade {
+    distance: f32,
+    power: f32,
+}
+
+impl Fade {
+    /// How much a hit at this distance counts, 0…1.
+    #[inline(always)]
+    fn weight(self, distance: f32) -> f32 {
+        let left = 1.0 - distance / self.distance;
+        let left = if left > 0.0 { left } else { 0.0 };
+        let left = if left < 1.0 { left } else { 1.0 };
+        let power = if self.power == 1.0 { left } else { trig::pow(left, self.power) };
+        // 0 to the power of 0 is 1.
+        if left > 0.0 { power } else { 0.0 }
+    }
+}
+
+/// How far upwind colliders shelter.
+#[derive(Clone, Copy)]
+struct Reach {
+    end: f32,
+    fade: Option<Fade>,
+}
+
+impl Reach {
+    /// Beyond this distance nothing counts.
+    #[inline(always)]
+    fn farthest(&self) -> f32 {
+        match self.fade {
+            Some(fade) if fade.distance < self.end => fade.distance,
+            _ => self.end,
+        }
+    }
 }
 
 /// Number of CVs that are sorted together: enough to be dense, few enough to stay in a cache.
@@ -105,6 +150,7 @@ pub fn shield_on(path: Path, starts: &[u32], points: &[Vec3], colliders: &[Colli
     if curves == 0 || reach.is_nan() || reach <= 0.0 {
         return vec![0.0; curves];
     }
+    let fade = (shield.distance > 0.0).then(|| Fade { distance: frame.length(shield.distance), power: shield.falloff });
     let obstacle = |collider: &Collider<'_>| Obstacle::of(&frame, collider, shield.cone > 0.0);
     let mut shares = vec![0.0; curves];
     let mut left = shares.as_mut_slice();
@@ -122,7 +168,9 @@ pub fn shield_on(path: Path, starts: &[u32], points: &[Vec3], colliders: &[Colli
         parallel::for_each(tasks, |_, (covered, views)| {
             for (covered, views) in covered.chunks_mut(LANES).zip(views.chunks(LANES)) {
                 if shield.cone > 0.0 {
-                    cone::cover(path, &obstacles, views, reach, shield.cone, covered);
+                    cone::cover(path, &obstacles, views, Reach { end: reach, fade }, shield.cone, covered);
+                } else if let Some(fade) = fade {
+                    rays::cover_nearest(path, &obstacles, views, reach, fade, covered);
                 } else {
                     rays::cover(path, &obstacles, views, reach, covered);
                 }

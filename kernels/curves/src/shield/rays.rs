@@ -1,7 +1,7 @@
 //! Sixteen rays at once, each a lane, against one triangle after another.
 
-use super::Obstacle;
 use super::views::View;
+use super::{Fade, Obstacle, Reach};
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::simd::kernel;
 use numerics::tree::Cuboid;
@@ -17,19 +17,23 @@ kernel! {
     ) = body;
 }
 
+kernel! {
+    /// Sets `covered` for each of up to sixteen CVs to how much the nearest collider within `reach` upwind counts.
+    pub(super) fn cover_nearest(
+        obstacles: &[Obstacle],
+        views: &[View],
+        reach: f32,
+        fade: Fade,
+        covered: &mut [f32],
+    ) = body_of_nearest;
+}
+
 #[inline(always)]
 fn body(obstacles: &[Obstacle], views: &[View], reach: f32, covered: &mut [f32]) {
-    let mut rays = Rays { at: [F32x16::splat(0.0); 3], gap: F32x16::splat(0.0), reach };
-    // A lane without a CV repeats the first.
-    let view = |lane: usize| if lane < views.len() { views[lane] } else { views[0] };
-    for lane in 0..LANES {
-        set(&mut rays.at, lane, view(lane).at);
-    }
+    let mut rays = Rays::of(views, reach);
     let mut hit = [0; LANES];
     for obstacle in obstacles {
-        for lane in 0..LANES {
-            rays.gap.0[lane] = view(lane).gap.at(obstacle.size);
-        }
+        rays.set_gaps(views, obstacle);
         if rays.meet(obstacle, &mut hit) {
             break;
         }
@@ -37,6 +41,25 @@ fn body(obstacles: &[Obstacle], views: &[View], reach: f32, covered: &mut [f32])
     for (covered, hit) in covered.iter_mut().zip(hit) {
         *covered = hit as f32;
     }
+}
+
+#[inline(always)]
+fn body_of_nearest(obstacles: &[Obstacle], views: &[View], reach: f32, fade: Fade, covered: &mut [f32]) {
+    let mut rays = Rays::of(views, Reach { end: reach, fade: Some(fade) }.farthest());
+    let mut nearest = F32x16::splat(f32::INFINITY);
+    for obstacle in obstacles {
+        rays.set_gaps(views, obstacle);
+        rays.find_nearest(obstacle, &mut nearest);
+    }
+    for (covered, distance) in covered.iter_mut().zip(nearest.0) {
+        *covered = fade.weight(distance);
+    }
+}
+
+/// The view of a lane.
+#[inline(always)]
+fn of_lane(views: &[View], lane: usize) -> &View {
+    if lane < views.len() { &views[lane] } else { &views[0] }
 }
 
 /// Sixteen rays upwind, by their starts.
@@ -47,11 +70,57 @@ struct Rays {
 }
 
 impl Rays {
+    /// The rays of up to sixteen CVs; a lane without a CV repeats the first.
+    #[inline(always)]
+    fn of(views: &[View], reach: f32) -> Self {
+        let mut rays = Self { at: [F32x16::splat(0.0); 3], gap: F32x16::splat(0.0), reach };
+        for lane in 0..LANES {
+            set(&mut rays.at, lane, of_lane(views, lane).at);
+        }
+        rays
+    }
+
+    #[inline(always)]
+    fn set_gaps(&mut self, views: &[View], obstacle: &Obstacle) {
+        for lane in 0..LANES {
+            self.gap.0[lane] = of_lane(views, lane).gap.at(obstacle.size);
+        }
+    }
+
+    /// The space that the rays pass through.
+    #[inline(always)]
+    fn swept(&self) -> Cuboid {
+        let Cuboid { low, high } = self.bounds();
+        Cuboid { low, high: [high[0], high[1], high[2] + self.reach] }
+    }
+
+    /// Lowers `nearest` to the distance at which each ray meets the tree.
+    #[inline(always)]
+    fn find_nearest(&self, obstacle: &Obstacle, nearest: &mut F32x16) {
+        let tree = &obstacle.tree;
+        for (block, mut lanes) in tree.walk(self.swept()) {
+            let (areas, [a, b, c]) = (&obstacle.areas[block], &tree.blocks()[block].corners);
+            while lanes != 0 {
+                let triangle = lanes.trailing_zeros() as usize;
+                lanes &= lanes - 1;
+                for lane in 0..LANES {
+                    let at = get(&self.at, lane);
+                    let seen = Seen::from([a, b, c].map(|corner| sub(get(corner, triangle), at)));
+                    let far = seen.towards > self.gap.0[lane] * areas.0[triangle];
+                    let near = seen.towards <= self.reach * seen.across;
+                    let distance = seen.towards / seen.across;
+                    let closer = seen.inside & far & near & (distance < nearest.0[lane]);
+                    nearest.0[lane] = if closer { distance } else { nearest.0[lane] };
+                }
+            }
+        }
+    }
+
     /// Sets `hit` to 1 for each ray that meets the tree; returns whether all do.
     #[inline(always)]
     fn meet(&self, obstacle: &Obstacle, hit: &mut [u32; LANES]) -> bool {
-        let (Cuboid { low, high }, tree) = (self.bounds(), &obstacle.tree);
-        for (block, mut lanes) in tree.walk(Cuboid { low, high: [high[0], high[1], high[2] + self.reach] }) {
+        let tree = &obstacle.tree;
+        for (block, mut lanes) in tree.walk(self.swept()) {
             let (areas, [a, b, c]) = (&obstacle.areas[block], &tree.blocks()[block].corners);
             while lanes != 0 {
                 let triangle = lanes.trailing_zeros() as usize;

@@ -16,7 +16,8 @@ fn lone(points: &[Vec3]) -> Vec<u32> {
     (0..=points.len() as u32).collect()
 }
 
-const STILL: Shield = Shield { wind: [1.0, 0.0, 0.0], offset: 10.0, cone: 0.0, skin_gap: 0.0 };
+const STILL: Shield =
+    Shield { wind: [1.0, 0.0, 0.0], offset: 10.0, distance: 0.0, falloff: 1.0, cone: 0.0, skin_gap: 0.0 };
 
 /// The result for each point as a curve of one CV.
 fn shares(points: &[Vec3], mesh: &(Vec<Vec3>, Vec<[u32; 3]>), how: &Shield) -> Vec<f32> {
@@ -171,7 +172,7 @@ fn shelter_is_the_same_at_any_scale_and_far_from_the_origin() {
         (0..600u64).map(|i| [0, 1, 2].map(|axis| Key::new(5).of(i).of(axis).f32() * 3.0 - 1.5)).collect();
     let starts: Vec<u32> = (0..=120).map(|curve| 5 * curve).collect();
     for cone in [0.0, 0.1] {
-        let how = Shield { wind: [0.5, 0.4, 0.8], offset: 8.0, cone, skin_gap: 0.0 };
+        let how = Shield { wind: [0.5, 0.4, 0.8], offset: 8.0, distance: 0.0, falloff: 1.0, cone, skin_gap: 0.0 };
         let expected = shield(&starts, &curves, &[Collider::of(&points, &triangles)], &how);
         for power in [-40, -10, 20, 100] {
             let scale = libm::scalbnf(1.0, power);
@@ -190,8 +191,10 @@ fn any_input_gives_a_fraction() {
     let points = [[f32::NAN, 0.0, 0.0], [inf, 0.0, 0.0], [1e38, -1e38, 1e38], [1e-45, 0.0, 0.0], [0.5, 0.0, 0.0]];
     let (mut wall, triangles) = wall(0.0);
     for cone in [0.0, 0.1] {
-        for offset in [1e-45, 10.0, f32::MAX] {
-            let how = Shield { offset, cone, ..STILL };
+        for (offset, distance) in
+            [(1e-45, 0.0), (10.0, 0.0), (f32::MAX, 0.0), (10.0, 1e-45), (f32::MAX, f32::MAX), (10.0, 0.7)]
+        {
+            let how = Shield { offset, distance, falloff: distance, cone, ..STILL };
             for mesh in [wall.clone(), vec![[0.0; 3]; 4], vec![[f32::NAN; 3]; 4], vec![[3e38, -3e38, 3e38]; 4]] {
                 let colliders = [Collider::of(&mesh, &triangles)];
                 let found = shield(&[0, 3, 3, 5], &points, &colliders, &how);
@@ -213,8 +216,8 @@ fn every_simd_path_and_any_number_of_threads_gives_the_same_bits() {
         (0..3000u64).map(|i| [0, 1, 2].map(|axis| Key::new(6).of(i).of(axis).f32() * 3.0 - 1.5)).collect();
     let starts: Vec<u32> = (0..=600).map(|curve| 5 * curve).collect();
     let colliders = [Collider::of(&points, &triangles)];
-    for cone in [0.0, 0.07] {
-        let how = Shield { wind: [0.5, 0.4, 0.8], cone, ..STILL };
+    for (cone, distance) in [(0.0, 0.0), (0.07, 0.0), (0.0, 0.8), (0.07, 0.8)] {
+        let how = Shield { wind: [0.5, 0.4, 0.8], cone, distance, falloff: 1.7, ..STILL };
         let expected = shield_on(Path::BASELINE, &starts, &curves, &colliders, &how);
         for path in Path::all() {
             for threads in [1, 2, 7] {
@@ -223,6 +226,27 @@ fn every_simd_path_and_any_number_of_threads_gives_the_same_bits() {
                 assert_eq!(found, expected, "{} on {threads}", path.name());
             }
         }
+    }
+}
+
+#[test]
+fn a_ray_that_meets_a_sphere_fades_with_its_distance_in_closed_form() {
+    // Roots downwind of the unit sphere, along x from it: the far side of the sphere as seen from them is nearest, at
+    // x − √(1 − y² − z²), less the sagitta of the facets.
+    let (points, triangles) = sphere(64);
+    let roots: Vec<Vec3> = (0..400u64)
+        .map(|i| {
+            let key = Key::new(9).of(i);
+            [1.2 + key.of(0).f32(), 1.4 * key.of(1).f32() - 0.7, 1.4 * key.of(2).f32() - 0.7]
+        })
+        .filter(|[_, y, z]| y * y + z * z < 0.6)
+        .collect();
+    let how = Shield { distance: 2.0, falloff: 2.5, ..STILL };
+    let found = shares(&roots, &(points, triangles), &how);
+    for ([x, y, z], found) in roots.iter().zip(found) {
+        let s = f64::from(*x) - (1.0 - f64::from(y * y + z * z)).sqrt();
+        let expected = libm::pow((1.0 - s / 2.0).max(0.0), 2.5);
+        assert!((f64::from(found) - expected).abs() < 4e-3, "{x} {y} {z}: {found} for {expected}");
     }
 }
 

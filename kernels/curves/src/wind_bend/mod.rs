@@ -56,10 +56,12 @@ pub struct Bend<'a> {
     pub blend: Masked<'a, f32>,
     /// Noise that varies the wind's direction.
     pub noise: Option<BendNoise<'a>>,
+    /// Added to the wind's direction at each CV: what gusts add to a wind of length 1.
+    pub gusts: Option<&'a [[f32; 3]]>,
 }
 
 /// Noise added to the wind's direction: `wind + amplitude · field(frequency · (root + origin +
-/// waviness · arc length · wind))`.
+/// waviness · arc length · wind))`; with `other` the field is a blend of itself and its value at another origin.
 #[derive(Clone, Debug)]
 pub struct BendNoise<'a> {
     /// The field.
@@ -68,10 +70,14 @@ pub struct BendNoise<'a> {
     pub amplitude: Masked<'a, f32>,
     /// Cells of the field per metre.
     pub frequency: f64,
-    /// A CV samples this many times its arc length downwind of its root; at 0 one sample for each curve is enough.
-    pub waviness: f32,
+    /// A CV samples this many times its arc length downwind of its root; at 0 one sample for each curve is enough. Masked
+    /// for each CV.
+    pub waviness: Masked<'a, f32>,
     /// Added to the root, in metres: the scene's origin minus the offset of the scroll.
     pub origin: [f64; 3],
+    /// Another origin, and the share of it, 0..1. Squares of both parts sum to 1, so that the mean strength is that of one
+    /// where both are not correlated.
+    pub other: Option<([f64; 3], f32)>,
     /// Position at which each curve's noise is sampled; `None`: its own root.
     pub roots: Option<&'a [[f32; 3]]>,
 }

@@ -11,7 +11,18 @@ fn linear(keys: &[[f32; 2]]) -> Ramp {
 /// A ramp that shows the distance itself: 1 − distance inside, 0 outside.
 fn felt(control: Control, points: &[[f32; 3]]) -> Vec<f32> {
     let falloff = one();
-    evaluate(points, &Gusts { base: 0.0, falloff: &falloff, spheres: &[], controls: &[control], incoming: None }).values
+    evaluate(
+        points,
+        &Gusts {
+            base: 0.0,
+            falloff: &falloff,
+            spheres: &[],
+            controls: &[control],
+            incoming: None,
+            masks: GustMasks::NONE,
+        },
+    )
+    .values
 }
 
 #[test]
@@ -57,7 +68,8 @@ fn negative_strengths_subtract_and_sums_follow_the_list_order() {
     let falloff = one();
     let control = |strength| Control::new(ControlShape::Sphere, [0.0; 3], UNIT, 2.0, one(), strength);
     let with = |controls: &[Control]| {
-        let gusts = Gusts { base: 0.75, falloff: &falloff, spheres: &[], controls, incoming: None };
+        let gusts =
+            Gusts { base: 0.75, falloff: &falloff, spheres: &[], controls, incoming: None, masks: GustMasks::NONE };
         evaluate(&[[0.5, 0.0, 0.0]], &gusts).values[0]
     };
     assert_eq!(with(&[control(-0.5)]), 0.25);
@@ -99,7 +111,7 @@ fn culling_never_loses_a_point() {
 fn an_outline_begins_with_its_centre_and_axes_and_lies_on_its_boundaries() {
     for (shape, outer) in [(ControlShape::Sphere, 2.0), (ControlShape::Cubes, 2.0), (ControlShape::Cubes, 1.0)] {
         for least in [0, 1000] {
-            let points = outline(shape, outer, least);
+            let points = outline(shape, [[outer; 3]; 2], least);
             assert_eq!(points[..AXIS_ROWS], [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
             assert!(points.len() >= least);
             for p in &points[AXIS_ROWS..] {
@@ -115,4 +127,31 @@ fn an_outline_begins_with_its_centre_and_axes_and_lies_on_its_boundaries() {
             }
         }
     }
+}
+
+#[test]
+fn the_outline_of_a_free_outer_box_has_its_corners() {
+    let points = outline(ControlShape::Cubes, [[2.0, 1.0, 3.0], [1.5, 4.0, 1.0]], 0);
+    let corner = |k: usize| [[-2.0, 1.5], [-1.0, 4.0], [-3.0, 1.0]].map(|ends: [f32; 2]| ends[k]);
+    let ends = |pick: fn(f32, f32) -> f32| {
+        let start = points[AXIS_ROWS];
+        points[AXIS_ROWS..].iter().fold(start, |so_far, p| [0, 1, 2].map(|k| pick(so_far[k], p[k])))
+    };
+    assert_eq!((ends(f32::min), ends(f32::max)), (corner(0), corner(1)));
+}
+
+#[test]
+fn a_box_of_equal_sides_has_the_bits_of_an_outer_cube_and_culling_reaches_all_of_any() {
+    let axes = [[0.3, 0.4, 0.0], [-0.4, 0.3, 0.1], [0.0, -0.1, 0.5]];
+    let cubes =
+        |outer| Control::new(ControlShape::Cubes, [1.1, 0.0, 0.9], axes, outer, linear(&[[0.0, 1.0], [1.0, 0.0]]), 1.0);
+    let points: Vec<[f32; 3]> =
+        (0..4096).map(|k| [k % 16, k / 16 % 16, k / 256].map(|x| 0.25 * x as f32 - 1.0)).collect();
+    let same = felt(cubes(1.0).within_box([2.5; 3], [2.5; 3]), &points);
+    assert!(same == felt(cubes(2.5), &points));
+    assert!(same.iter().any(|x| *x > 0.0));
+    let free = Control::new(ControlShape::Cubes, [1.1, 0.0, 0.9], axes, 1.0, one(), 1.0);
+    let free = free.within_box([1.0, 2.0, 3.0], [3.0, 1.5, 1.0]);
+    let alone: Vec<f32> = points.iter().flat_map(|p| felt(free.clone(), &[*p])).collect();
+    assert!(felt(free, &points) == alone && alone.contains(&1.0));
 }

@@ -31,8 +31,14 @@ fn any_finite_input_gives_values_from_0_to_1() {
                 let axes = [[size, 0.0, 0.0], [0.0, size, 0.0], [0.0, 0.0, size]];
                 let controls = [ControlShape::Sphere, ControlShape::Cubes]
                     .map(|shape| Control::new(shape, [-size, 0.0, 0.0], axes, 1e30, falloff.clone(), f32::MAX));
-                let gusts =
-                    Gusts { base: 0.5, falloff: &falloff, spheres: &[gust, gust], controls: &controls, incoming: None };
+                let gusts = Gusts {
+                    base: 0.5,
+                    falloff: &falloff,
+                    spheres: &[gust, gust],
+                    controls: &controls,
+                    incoming: None,
+                    masks: GustMasks::NONE,
+                };
                 assert!(evaluate(&points, &gusts).values.iter().all(|x| (0.0..=1.0).contains(x)), "{size} {noise}");
             }
         }

@@ -11,6 +11,7 @@ const PLAIN: Draw = Draw {
     life: [24.0, 96.0],
     decay: [6.0, 24.0],
     repeat: 0.0,
+    period: 0,
 };
 
 #[test]
@@ -107,4 +108,29 @@ fn the_plane_lies_upwind_of_the_box_and_covers_it() {
         let along: f64 = (0..3).map(|k| (p[k] - start[k]) * wind[k]).sum();
         assert!(along > -1e-12);
     }
+}
+
+#[test]
+fn a_looped_gust_comes_again_with_the_same_random_numbers() {
+    let moments = [0.0, 3.25, 20.0, 47.0];
+    for (repeat, rounds) in [(0.0, 1), (12.0, 4), (11.0, 4), (1000.0, 1), (13.9, 3)] {
+        let draw = Draw { repeat, ..PLAIN }.looped(48.0);
+        assert_eq!(draw.period, rounds, "{repeat}");
+        for moment in moments {
+            let now = draw.at(moment).gusts;
+            assert!(!now.is_empty());
+            for loops in [1, -2, 1000] {
+                let shift = 48.0 * f64::from(loops);
+                let later = draw.at(moment + shift).gusts;
+                assert_eq!(now.len(), later.len());
+                for (a, b) in now.iter().zip(&later) {
+                    assert!((b.start - a.start - shift).abs() < 1e-9 && (b.strength - a.strength).abs() < 1e-6);
+                    assert_eq!(Gust { start: a.start, strength: a.strength, ..*b }, *a);
+                }
+            }
+        }
+    }
+    let four = Draw { repeat: 12.0, gusts: 1, start: [1.0; 2], life: [11.0; 2], decay: [0.0; 2], ..PLAIN }.looped(48.0);
+    let salts: Vec<u32> = (0..4).map(|round| four.at(2.0 + 12.0 * f64::from(round)).gusts[0].salt).collect();
+    assert!((1..4).all(|k| salts[k] != salts[0]), "the rounds of a loop differ");
 }

@@ -24,7 +24,7 @@ fn sphere(centre: [f64; 3], radius: f32) -> Sphere {
 }
 
 fn only<'a>(falloff: &'a Ramp, spheres: &'a [Sphere]) -> Gusts<'a> {
-    Gusts { base: 0.0, falloff, spheres, controls: &[], incoming: None }
+    Gusts { base: 0.0, falloff, spheres, controls: &[], incoming: None, masks: GustMasks::NONE }
 }
 
 /// Random points in a cube of this half size about a centre.

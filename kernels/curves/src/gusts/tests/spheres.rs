@@ -123,8 +123,14 @@ fn every_path_and_number_of_threads_gives_the_same_bits() {
     let controls = [ControlShape::Sphere, ControlShape::Cubes]
         .map(|shape| Control::new(shape, [1.0, 0.0, 0.5], axes, 1.5, smooth(), -0.4));
     let falloff = smooth();
-    let gusts =
-        Gusts { base: 0.1, falloff: &falloff, spheres: &spheres, controls: &controls, incoming: Some(&incoming) };
+    let gusts = Gusts {
+        base: 0.1,
+        falloff: &falloff,
+        spheres: &spheres,
+        controls: &controls,
+        incoming: Some(&incoming),
+        masks: GustMasks::NONE,
+    };
     let expected = evaluate_on(Path::BASELINE, &points, &gusts);
     for path in Path::all() {
         for threads in [1, 2, 7] {
@@ -132,6 +138,53 @@ fn every_path_and_number_of_threads_gives_the_same_bits() {
             let found = pool.install(|| evaluate_on(path, &points, &gusts));
             assert_eq!(bits(&found.values), bits(&expected.values), "{} × {threads}", path.name());
             assert_eq!(found, expected);
+        }
+    }
+}
+
+#[test]
+fn masks_scale_the_base_and_the_influences_of_single_points() {
+    let (falloff, spheres) = (one(), [Sphere { strength: 0.25, ..sphere([0.0; 3], 1.0) }]);
+    let (base, strength) = ([0.0, 1.0, 0.5, 9.0, f32::NAN, -1.0], [1.0, 0.0, 2.0, 0.5, -1.0, f32::INFINITY]);
+    let masks = GustMasks { base: Some(&base), strength: Some(&strength) };
+    let gusts = Gusts { base: 0.5, masks, ..only(&falloff, &spheres) };
+    assert_eq!(evaluate(&[[0.0; 3]; 6], &gusts).values, [0.25, 0.5, 0.75, 1.0, 0.0, 1.0]);
+    assert_eq!(evaluate(&[[5.0; 3]; 6], &gusts).values, [0.0, 0.5, 0.25, 1.0, 0.0, 0.0], "out of reach");
+    // Masks of 1 change no bit, whatever is culled.
+    let points = hairs(40);
+    let ones = vec![1.0; points.len()];
+    let masks = GustMasks { base: Some(&ones), strength: Some(&ones) };
+    let spheres: Vec<Sphere> = strewn(20, [1.0, 0.0, 1.0], 1.2).iter().map(|c| sphere(c.map(f64::from), 0.3)).collect();
+    let falloff = smooth();
+    let plain = Gusts { base: 0.2, ..only(&falloff, &spheres) };
+    assert_eq!(evaluate(&points, &Gusts { masks, ..plain.clone() }), evaluate(&points, &plain));
+}
+
+#[test]
+fn gusts_blow_to_their_sides_by_their_influence() {
+    let spheres = [Sphere { strength: 0.5, ..sphere([0.0; 3], 2.0) }, sphere([1.0, 0.0, 0.0], 2.0)];
+    let falloff = Ramp::new(vec![[0.0, 1.0], [1.0, 0.0]], Interpolation::Linear).unwrap();
+    let sides = [[0.0, 1.0, 0.0], [0.0, 0.0, -2.0]];
+    // At x = 1: 0.5 · (1 − ½) of the first, all of the second; at −1 the second's boundary; at 9 nothing.
+    let points = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [9.0, 0.0, 0.0]];
+    let found = sideways(&points, &only(&falloff, &spheres), &sides);
+    assert_eq!(found, [[0.0, 0.25, -2.0], [0.0, 0.25, 0.0], [0.0; 3]]);
+    let strength = [2.0, -1.0, 1.0];
+    let masks = GustMasks { strength: Some(&strength), base: None };
+    let found = sideways(&points, &Gusts { masks, ..only(&falloff, &spheres) }, &sides);
+    assert_eq!(found, [[0.0, 0.5, -4.0], [0.0; 3], [0.0; 3]]);
+    let (points, sides) = (hairs(60), vec![[0.3, -0.4, 0.5]; 40]);
+    let spheres: Vec<Sphere> = strewn(40, [1.0, 0.0, 1.0], 1.2)
+        .iter()
+        .map(|c| Sphere { noise: 0.4, salt: c[0].to_bits(), ..sphere(c.map(f64::from), 0.3) })
+        .collect();
+    let gusts = only(&falloff, &spheres);
+    let expected = sideways_on(Path::BASELINE, &points, &gusts, &sides);
+    for path in Path::all() {
+        for threads in [1, 7] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let found = pool.install(|| sideways_on(path, &points, &gusts, &sides));
+            assert!(found.as_flattened() == expected.as_flattened(), "{} × {threads}", path.name());
         }
     }
 }

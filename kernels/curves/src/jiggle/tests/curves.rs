@@ -226,3 +226,61 @@ fn lengths_are_interpolated_between_two_shapes() {
     with_lengths_between(&starts, [&from, &from], 0.3, &mut same);
     assert_eq!(same, from);
 }
+
+#[test]
+fn curves_of_a_clump_swing_as_their_mean_curve_does() {
+    // Three curves of one clump whose tips are pulled by 0.1, 0.2 and 0.6 m, and a fourth alone. As springs are linear, the
+    // mean of the swings is the swing of a curve pulled by 0.3 m.
+    let curve = |x: f32, pull: f32| (0..5).map(move |k| [x + pull * k as f32 * 0.25, 0.25 * k as f32, 0.0]);
+    let pulls = [0.1, 0.2, 0.6, 0.3];
+    let groom = |pulled: bool| -> Vec<Vec3> {
+        (0..4).flat_map(|i| curve(i as f32, if pulled { pulls[i] } else { 0.0 })).collect()
+    };
+    let (starts, rest, softness) = ([0, 5, 10, 15, 20], groom(false), rising());
+    let mut jiggle = Jiggle::at_rest(&starts, &rest, &rest);
+    for _ in 0..7 {
+        jiggle.step(&groom(true), &spring(0.4, 0.3, &softness, Drag::Target), 1.0, None);
+    }
+    let offsets = |jiggle: &Jiggle, share: f32, clumps: &Clumps| {
+        let mut offsets = vec![DVec3::zeros(); 20];
+        for (curves, step, state) in jiggle.batches.iter().flat_map(CurveBatch::steps) {
+            curves
+                .cvs(step)
+                .for_each(|(lane, cv)| offsets[cv] = [0, 1, 2].map(|axis| state.offset[axis].0[lane]).into());
+        }
+        gather::gathered(&starts, &jiggle.along, &offsets, clumps, share.into())
+    };
+    let clumps = Clumps::of_ids(&[4, 4, 4, -1]);
+    let (own, together, half) =
+        (offsets(&jiggle, 0.0, &clumps), offsets(&jiggle, 1.0, &clumps), offsets(&jiggle, 0.5, &clumps));
+    assert!(own[19].norm() > 0.01);
+    for cv in 0..20 {
+        let expected = if cv < 15 { own[15 + cv % 5] } else { own[cv] };
+        assert!((together[cv] - expected).norm() < 1e-6, "{cv}");
+        assert!((half[cv] - 0.5 * (own[cv] + expected)).norm() < 1e-6, "{cv}");
+    }
+    let (all, alone) = (Masked::uniform(1.0), Clumps::of_ids(&[-1; 4]));
+    assert_eq!(bits(&jiggle.shape_clumped(all, &clumps, 0.0.into()).points), bits(&jiggle.shape(all).points));
+    assert_eq!(bits(&jiggle.shape_clumped(all, &alone, all).points), bits(&jiggle.shape(all).points));
+    let shaped = jiggle.shape_clumped(all, &clumps, all).points;
+    for curve in shaped.chunks(5) {
+        let pulled = curve.windows(2).map(|ends| numerics::vector::length(numerics::vector::sub(ends[1], ends[0])));
+        let pull = pulls[(curve[0][0]) as usize];
+        assert!(pulled.into_iter().all(|length| (length - 0.25 * (1.0 + pull * pull).sqrt()).abs() < 1e-6));
+    }
+}
+
+#[test]
+fn curves_of_other_cvs_meet_in_their_clump_by_fractions_of_their_length() {
+    // Offsets 2u and 4u of curves of 3 and 5 CVs: the mean is 3u.
+    let (starts, along) = ([0, 3, 8, 10], [0.0, 0.5, 1.0, 0.0, 0.25, 0.5, 0.75, 1.0, 0.0, 0.0]);
+    let offset = |cv: usize| DVec3::x() * f64::from(along[cv]) * if cv < 3 { 2.0 } else { 4.0 };
+    let offsets: Vec<DVec3> = (0..10).map(offset).collect();
+    let mask = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, f32::NAN, 1.0, 1.0];
+    let share = Masked { value: 1.0, mask: Some(&mask[..]) };
+    let found = gather::gathered(&starts, &along, &offsets, &Clumps::of_ids(&[0, 0, 0]), share);
+    for (cv, found) in found.iter().enumerate() {
+        let expected = if cv == 7 { 4.0 } else { 3.0 } * f64::from(along[cv]);
+        assert!((found.x - expected).abs() < 1e-7, "{cv}: {found}");
+    }
+}

@@ -103,8 +103,9 @@ fn lengths_hold_from_2_to_10_000_cvs() {
                     field: &field,
                     amplitude: 1.0.into(),
                     frequency: 2.0,
-                    waviness: 1.0,
+                    waviness: 1.0.into(),
                     origin: [0.0; 3],
+                    other: None,
                     roots: None,
                 });
                 let bent = groom.bend(&Bend { mode, rotate: rotate.into(), noise, ..plain(&ramp) });
@@ -170,8 +171,9 @@ fn extreme_parameters_give_finite_results() {
                         field: &field,
                         amplitude: amplitude.into(),
                         frequency,
-                        waviness,
+                        waviness: waviness.into(),
                         origin,
+                        other: None,
                         roots: None,
                     };
                     let with = Bend { rotate: rotate.into(), mode, noise: Some(noise), ..plain(&ramp) };

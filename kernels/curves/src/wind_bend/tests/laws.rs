@@ -154,7 +154,15 @@ fn scaling_by_a_power_of_two_is_exact() {
 }
 
 fn noisy(field: &numerics::noise::Field) -> BendNoise<'_> {
-    BendNoise { field, amplitude: 0.8.into(), frequency: 1.0, waviness: 0.0, origin: [0.0; 3], roots: None }
+    BendNoise {
+        field,
+        amplitude: 0.8.into(),
+        frequency: 1.0,
+        waviness: 0.0.into(),
+        origin: [0.0; 3],
+        other: None,
+        roots: None,
+    }
 }
 
 #[test]
@@ -201,8 +209,8 @@ fn noise_is_sampled_at_the_given_roots() {
 fn waviness_varies_the_wind_down_the_curve() {
     let (ramp, field) = (one(), Field::new(NoiseKind::Perlin, 1, 0.5, 1));
     let groom = Groom::of(&[straight([0.3, 0.2, 0.1], [0.0, 4.0, 0.0], 6)]);
-    let wavy = |waviness| {
-        let noise = BendNoise { waviness, ..noisy(&field) };
+    let wavy = |waviness: f32| {
+        let noise = BendNoise { waviness: waviness.into(), ..noisy(&field) };
         groom.bend(&Bend { noise: Some(noise), rotate: 1.0.into(), ..plain(&ramp) })
     };
     // With one direction for all pivots a straight curve at g = 1 stays straight.
@@ -241,4 +249,64 @@ fn without_wind_curves_keep_their_bits() {
         assert_eq!(bits(&bent.points), bits(&groom.points));
         assert_eq!((bent.max_angle, bent.length_error), (0.0, 0.0));
     }
+}
+
+#[test]
+fn gusts_add_to_the_direction_of_the_wind_at_each_cv() {
+    // Wind along x and a gust along z of length 1 blow along the diagonal: with g 1 all segments lie along it. NaN counts
+    // as 0.
+    let (groom, ramp) = (Groom::of(&[straight([0.0; 3], [0.0, 1.0, 0.0], 4)]), one());
+    let with = |gusts: &[Vec3]| groom.bend(&Bend { gusts: Some(gusts), rotate: 1.0.into(), ..plain(&ramp) });
+    let diagonal = std::f64::consts::FRAC_1_SQRT_2;
+    assert!(angles(&with(&[[0.0, 0.0, 1.0]; 5]).points, [diagonal, 0.0, diagonal]).iter().all(|angle| *angle < 2e-6));
+    // One that blows at the third CV alone: the first two segments along x, the others along the diagonal.
+    let mut once = [[f32::NAN, 0.0, 0.0]; 5];
+    once[2] = [0.0, 0.0, 1.0];
+    let bent = with(&once);
+    assert!(angles(&bent.points, [1.0, 0.0, 0.0])[..2].iter().all(|angle| *angle < 2e-6));
+    assert!(angles(&bent.points, [diagonal, 0.0, diagonal])[2] < 2e-6);
+    assert_kept(&groom, &with(&[[f32::MAX, -f32::MAX, f32::INFINITY]; 5]));
+    // No gust and a gust of 0 give the same bits, noise or not.
+    let (groom, field) = (tangled(40, 9), Field::new(NoiseKind::Perlin, 2, 0.5, 3));
+    let still = vec![[0.0; 3]; groom.points.len()];
+    let noise = BendNoise { waviness: 1.0.into(), ..noisy(&field) };
+    let with = Bend { noise: Some(noise), ..plain(&ramp) };
+    assert_eq!(
+        bits(&groom.bend(&Bend { gusts: Some(&still), ..with.clone() }).points),
+        bits(&groom.bend(&with).points)
+    );
+}
+
+#[test]
+fn another_origin_is_blended_in_by_its_share() {
+    let (groom, ramp) = (tangled(40, 9), one());
+    let field = Field::new(NoiseKind::Perlin, 2, 0.5, 3);
+    let bent =
+        |origin, other| groom.bend(&Bend { noise: Some(BendNoise { origin, other, ..noisy(&field) }), ..plain(&ramp) });
+    let (here, there) = ([0.0; 3], [3.5, 0.25, -1.0]);
+    assert_eq!(bits(&bent(here, Some((there, 0.0))).points), bits(&bent(here, None).points));
+    assert_eq!(bits(&bent(here, Some((there, 1.0))).points), bits(&bent(there, None).points));
+    // In between the direction is wind + 0.8 · (a + b) ÷ √2, as the field itself gives it.
+    let root = [0.3, -0.7, 0.9];
+    let groom = Groom::of(&[straight(root, [0.0, 1.0, 0.0], 1)]);
+    let noise = BendNoise { other: Some((there, 0.5)), ..noisy(&field) };
+    let bent = groom.bend(&Bend { noise: Some(noise), rotate: 1.0.into(), ..plain(&ramp) });
+    let [a, b] = [here, there].map(|origin: [f64; 3]| field.at([0, 1, 2].map(|k| f64::from(root[k]) + origin[k])));
+    let towards = DVec3::from([0, 1, 2].map(|k| f64::from(a[k] + b[k]) * 0.8 * std::f64::consts::FRAC_1_SQRT_2));
+    let towards = (DVec3::x() + towards).normalize();
+    assert!(angles(&bent.points, towards.into())[0] < 4e-6);
+}
+
+#[test]
+fn a_mask_scales_the_waviness_where_it_is() {
+    let (groom, ramp) = (tangled(40, 9), one());
+    let field = Field::new(NoiseKind::Perlin, 2, 0.5, 3);
+    let bent = |value, mask| {
+        let noise = BendNoise { waviness: Masked { value, mask }, ..noisy(&field) };
+        bits(&groom.bend(&Bend { noise: Some(noise), ..plain(&ramp) }).points)
+    };
+    let (ones, halves) = (vec![1.0; groom.points.len()], vec![0.5; groom.points.len()]);
+    assert_eq!(bent(2.0, Some(&ones)), bent(2.0, None));
+    assert_eq!(bent(2.0, Some(&halves)), bent(1.0, None));
+    assert_ne!(bent(2.0, None), bent(1.0, None));
 }

@@ -70,6 +70,7 @@ fn plain(ramp: &Ramp) -> Bend<'_> {
         mode: BendMode::Paper,
         blend: 1.0.into(),
         noise: None,
+        gusts: None,
     }
 }
 

@@ -41,8 +41,9 @@ fn one_accumulated_quaternion_equals_moving_all_later_points_at_every_pivot() {
         field: &field,
         amplitude: 0.7.into(),
         frequency: 3.0,
-        waviness: 0.8,
+        waviness: 0.8.into(),
         origin: [100.0, 7.0, -3.0],
+        other: None,
         roots: None,
     };
     for noise in [None, Some(noise)] {
@@ -56,7 +57,7 @@ fn one_accumulated_quaternion_equals_moving_all_later_points_at_every_pivot() {
             let wind_at = |arc: f64| {
                 let wind = to_f64(wind);
                 let Some(noise) = &with.noise else { return wind };
-                let displacement = wind * (arc * f64::from(noise.waviness));
+                let displacement = wind * (arc * f64::from(noise.waviness.value));
                 let at = (to_f64(curve[0]) + DVec3::from(noise.origin) + displacement) * noise.frequency;
                 wind + to_f64(vector::scale(field.at(at.into()), noise.amplitude.value))
             };
@@ -84,8 +85,9 @@ fn every_path_and_number_of_threads_gives_the_same_bits() {
                     field: &field,
                     amplitude: 0.7.into(),
                     frequency: 3.0,
-                    waviness: 0.8,
+                    waviness: 0.8.into(),
                     origin: [1e6, 0.0, 0.0],
+                    other: None,
                     roots: None,
                 }),
                 ..plain(&ramp)

@@ -1,0 +1,100 @@
+//! `clump`: curves that wind, gusts and jiggle move together.
+//!
+//! The rule for all nodes of the family: what a curve of a clump would get at its own root it gets at the mean root of its
+//! clump, by the share `clump_blend`. Curves keep their own shapes and lengths.
+
+use curves::attach::RootPositions;
+use curves::clumps::Clumps;
+use engine::expr::suggest::nearest;
+use engine::geometry::ColumnType;
+use engine::prelude::*;
+use std::sync::Arc;
+
+/// Params of every node that has clumps.
+pub(crate) const NAME: Param<Name> = Param::text(
+    "clump",
+    "",
+    "Name of an attribute of curves, whole numbers: curves with the same number move together, those below 0 alone. If \
+     empty, `clump_radius` may find clumps.",
+)
+.fixed();
+
+/// See [`NAME`].
+pub(crate) const RADIUS: Param<f32> = Param::float(
+    "clump_radius",
+    0.0,
+    "Distance of roots within which curves move together, if `clump` names no attribute: clumps are found at the scene's \
+     first frame, and are about this far apart. 0 finds none.",
+)
+.unit(Unit::Metres)
+.at_least(0.0)
+.soft(0.0, 0.1)
+.when(|params| params.get(NAME).is_empty());
+
+/// See [`NAME`].
+pub(crate) const BLEND: Param<Maskable> = Param::maskable(
+    "clump_blend",
+    1.0,
+    "How much curves move with their clump: at 0 each moves on its own, at 1 those of a clump move as one.",
+)
+.within(0.0, 1.0)
+.when(is_asked);
+
+/// Whether curves may be in clumps.
+pub(crate) fn is_asked(params: &Params) -> bool {
+    !params.get(NAME).is_empty() || params.get(RADIUS) > 0.0
+}
+
+/// Whether any curve moves with its clump.
+pub(crate) fn acts(params: &Params) -> bool {
+    is_asked(params) && params.get(BLEND).value > 0.0
+}
+
+/// Whether clumps are found from the curves of the scene's first frame.
+pub(crate) fn reads_start(params: &Params) -> bool {
+    acts(params) && params.get(NAME).is_empty()
+}
+
+/// The clumps of some curves, which at the scene's first frame were `start`; `None` if all move alone.
+///
+/// # Errors
+/// If the curves have no such attribute, or are not those of the first frame.
+pub(crate) fn of(params: &Params, curves: &Component, start: Option<&Component>) -> Result<Option<Arc<Clumps>>> {
+    if !acts(params) {
+        return Ok(None);
+    }
+    let name = params.get(NAME);
+    let clumps = if name.is_empty() {
+        let Some(start) = start else { return Ok(None) };
+        if start.element_count() != curves.element_count() {
+            let fact = "`clump_radius` finds clumps at the scene's first frame, which has other curves";
+            return Err(Error::refused(fact).hint("give the curves an attribute of clumps and name it in `clump`"));
+        }
+        let radius = params.get(RADIUS);
+        start.kept(Found(radius.to_bits()), || Ok(Clumps::within(roots(start).as_slice(), radius)))?
+    } else {
+        let ids = curves.table(Owner::Element).get::<i32>(&name).ok_or_else(|| refused(&name, curves))?;
+        Arc::new(Clumps::of_ids(ids))
+    };
+    Ok(Some(clumps).filter(|clumps| !clumps.is_empty()))
+}
+
+/// The root of each curve.
+pub(crate) fn roots(curves: &Component) -> RootPositions {
+    RootPositions::of(curves.runs().starts(), curves.positions())
+}
+
+fn refused(name: &str, curves: &Component) -> Error {
+    let what = curves.describe(name).map_or("which the curves do not have".into(), |found| format!("which is {found}"));
+    let fits =
+        |(owner, _, column): &(Owner, &Name, &Column)| *owner == Owner::Element && column.kind() == ColumnType::I1;
+    let hint = match nearest(name, curves.columns().filter(fits).map(|(_, name, _)| &**name)) {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => "expected an attribute of one whole number for each curve".to_owned(),
+    };
+    Error::refused(format!("`clump` is `{name}`, {what}")).hint(hint).of("clump").of_types()
+}
+
+/// Key of the clumps found with a radius, as bits.
+#[derive(PartialEq)]
+struct Found(u32);
