@@ -2,7 +2,7 @@
 //!
 //! `cargo test` runs coarse forms of the laws that take long, and cooks scenes with a solver to their fifth frame only; here
 //! nothing is shortened. Fails where a law does not hold, or where a table or the bits differ from the stored ones.
-//! `-- --bless` stores them; words run some of the parts: `wind`, `softbody`, `liquid`, `graphs`.
+//! `-- --bless` stores them; words run some of the parts: `wind`, `softbody`, `liquid`, `graphs`, `stability`.
 
 #![allow(clippy::unwrap_used, reason = "a value that is not there fails the check")]
 
@@ -19,19 +19,29 @@ mod accuracy_table;
 mod bits;
 #[path = "../tests/cooked/mod.rs"]
 mod cooked;
+#[path = "../tests/stability/every_node.rs"]
+mod every_node;
+#[path = "../tests/stability/liquid/mod.rs"]
+mod liquid;
 #[path = "../tests/liquid/accuracy/mod.rs"]
 mod liquid_accuracy;
 #[allow(dead_code, reason = "the laws use part of it")]
 #[path = "../tests/softbody/measure.rs"]
 mod measure;
+#[path = "../tests/stability/page.rs"]
+mod page;
 #[allow(dead_code, reason = "the laws use part of it")]
 #[path = "../tests/softbody/scene.rs"]
 mod scene;
 #[path = "../tests/softbody/shapes.rs"]
 mod shapes;
+#[path = "../tests/stability/softbody/mod.rs"]
+mod softbody;
 #[path = "../tests/softbody/accuracy/mod.rs"]
 mod softbody_accuracy;
 mod timing;
+#[path = "../tests/stability/wind/mod.rs"]
+mod wind;
 #[path = "../tests/wind/accuracy/mod.rs"]
 mod wind_accuracy;
 
@@ -44,8 +54,9 @@ fn main() -> ExitCode {
     let bless = words.iter().any(|word| word == "--bless");
     let parts: Vec<&str> = words.iter().map(String::as_str).filter(|word| *word != "--bless").collect();
     let asked = |part: &str| parts.is_empty() || parts.contains(&part);
-    if let Some(other) = parts.iter().find(|part| !["wind", "softbody", "liquid", "graphs"].contains(part)) {
-        eprintln!("no part is `{other}`; expected wind, softbody, liquid or graphs");
+    let known = ["wind", "softbody", "liquid", "graphs", "stability"];
+    if let Some(other) = parts.iter().find(|part| !known.contains(part)) {
+        eprintln!("no part is `{other}`; expected one of {}", known.join(", "));
         return ExitCode::from(2);
     }
     print_date();
@@ -62,6 +73,11 @@ fn main() -> ExitCode {
     }
     if asked("graphs") {
         held &= stored("benches/graphs.txt", last_frames(), bless);
+    }
+    if asked("stability") {
+        page::run_in_full();
+        [every_node::GROUPS, wind::GROUPS, softbody::GROUPS, liquid::GROUPS].concat().iter().for_each(|table| table());
+        held &= stored("docs/stability.md", page::text(), bless);
     }
     if held { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }

@@ -15,6 +15,14 @@ pub struct Frames {
     known: FrameSet,
     /// First frames and steps of ranges to the scene's end.
     open: Vec<(Frame, Frame)>,
+    /// As it was written.
+    text: String,
+}
+
+impl std::fmt::Display for Frames {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.text)
+    }
 }
 
 /// More frames than this are assumed to be a typing error.
@@ -51,7 +59,7 @@ impl FromStr for Frames {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let mut frames = Self { known: FrameSet::default(), open: Vec::new() };
+        let mut frames = Self { known: FrameSet::default(), open: Vec::new(), text: text.into() };
         for part in text.split(',') {
             match part_of(part.trim())? {
                 Part::Known(part) => frames.known = frames.known.union(&part),

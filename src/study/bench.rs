@@ -15,7 +15,7 @@ use engine::plan::Request;
 use engine::time::Frame;
 
 use super::knobs::{Knob, settings};
-use super::norms::{Errors, Measure, Norm};
+use super::norms::{self, Errors, Measure, Norm};
 use crate::failure::{Exit, Failure};
 use crate::load;
 use crate::progress::Progress;
@@ -117,15 +117,28 @@ pub(super) enum Cooked<T> {
 }
 
 impl Subject<'_> {
-    /// The graph with these settings; a fault of a value is a failed run, a fault of a name a failure of the command.
+    /// Refuses values that no graph may have there, before anything is cooked.
+    ///
+    /// # Errors
+    /// If a knob has no such param, or a value is of another type than it.
+    pub(super) fn check(&self, knobs: &[Knob]) -> Result<(), Failure> {
+        for knob in knobs {
+            for value in &knob.values {
+                self.graph(&[(knob.key.clone(), value.clone())])?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The graph with these settings. A number outside a range is a failed run; a wrong name or a value of another type is a
+    /// failure of the command.
     fn graph(&self, set: &[(String, String)]) -> Result<Cooked<Graph>, Failure> {
         let set: Vec<_> = self.fixed.iter().chain(set).cloned().collect();
         let faults = match load::loaded(self.bytes, self.path, &settings(&set)) {
             Ok(graph) => return Ok(Cooked::Done(graph)),
             Err(faults) => faults,
         };
-        let is_of_name = |code: &str| [code::UNKNOWN_SET, code::UNKNOWN_NODE, code::UNKNOWN_PARAM].contains(&code);
-        match faults.iter().find(|fault| fault.set.is_none() || is_of_name(fault.code)) {
+        match faults.iter().find(|fault| fault.set.is_none() || fault.code != code::ILLEGAL_VALUE) {
             Some(_) => {
                 let mut failure = load::faulty(self.path, &faults);
                 failure.lines.iter_mut().for_each(|line| *line = line.replacen("--set ", "--knob ", 1));
@@ -268,6 +281,7 @@ pub(super) fn set_of(knobs: &[Knob], setting: &[usize]) -> Vec<(String, String)>
 /// Results that the norm cannot compare make the whole study useless, not only a run.
 fn not_comparable(measure: &Measure, frame: Frame, why: &str) -> Failure {
     let hint = match measure {
+        _ if why.starts_with(norms::NO_ATTRIBUTE) => "",
         Measure::Points | Measure::Attribute(_) => {
             "; where points come and go, use --norm surface, which measures distances between surfaces, or volume"
         }

@@ -179,7 +179,7 @@ fn within(number: f64, range: &Bounds) -> f64 {
 }
 
 /// A number as a graph has it.
-fn number_text(number: f64) -> String {
+pub(super) fn number_text(number: f64) -> String {
     // Ratios such as 1e-3 ÷ 1e-2 have a tail of rounding.
     let rounded: f64 = format!("{number:.12e}").parse().unwrap_or(number);
     if rounded.fract() == 0.0 && rounded.abs() < 1e15 { format!("{rounded:.0}") } else { format!("{rounded:?}") }

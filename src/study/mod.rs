@@ -4,6 +4,7 @@
 //! with one reference, beyond the best of them; how far the best is from it is the floor, below which nothing is claimed.
 
 mod bench;
+mod extremes;
 mod knobs;
 mod measure;
 mod nearest;
@@ -46,6 +47,17 @@ pub struct StudyArgs {
     /// step beyond the best, or with an exact method where the node has one. Without knobs, the graph's are listed
     #[arg(long = "knob", value_name = "NODE.PARAM=V,V,…")]
     knobs: Vec<KnobArg>,
+    /// Instead of a comparison: cook the graph with each param of each node at both ends of its range, and print for each what
+    /// came of it: finite, refused (with the message) or capped (with what a node could not meet). All outputs, unless --output
+    /// names one; the scene's first 24 frames, unless --frames says which. Exit code 4 if anything else comes of one
+    #[arg(long, conflicts_with_all = ["knobs", "norm", "tolerance", "budget", "out", "repeats", "fresh"])]
+    extremes: bool,
+    /// With --extremes: the longest that each cook may take; what takes longer is stopped, and its frames so far are reported
+    #[arg(long, value_name = "TIME", default_value = "10s", requires = "extremes")]
+    limit: Budget,
+    /// One of these cooks, in a process of its own.
+    #[arg(long, hide = true, value_name = "KEY=VALUE", requires = "extremes")]
+    extreme: Option<String>,
     /// The output to compare [default: the only one]
     #[arg(long, value_name = "NAME")]
     output: Option<String>,
@@ -63,7 +75,7 @@ pub struct StudyArgs {
     /// Write the graph with the most accurate values that take at most this per frame: 20ms, 1.5s
     #[arg(long, value_name = "TIME")]
     budget: Option<Budget>,
-    /// Write all runs to this file as JSON; - writes them to stdout, and the table to stderr
+    /// Write all runs, or all lines of --extremes, to this file as JSON; - writes them to stdout, and the table to stderr
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Folder for the plot NAME.svg, the graph NAME.tuned.jsonc and the runs NAME.study; created if missing
@@ -119,6 +131,9 @@ impl FromStr for Budget {
 /// If the graph has faults, a file cannot be written, the norm does not fit, nothing satisfies the tolerance or budget, or
 /// the study is interrupted.
 pub fn run(args: &StudyArgs) -> Result<(), Failure> {
+    if args.extremes {
+        return extremes::run(args);
+    }
     let wrong = |line: String| Failure::new(Exit::CommandLine, line);
     let bytes = load::bytes(&args.graph)?;
     let loaded = load::loaded(&bytes, &args.graph, &args.set);
@@ -182,6 +197,7 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
         (None, Some(Budget(ms))) => Goal::Budget(ms),
         (None, None) => Goal::None,
     };
+    subject.check(&knobs)?;
     create_folder(&args.out)?;
     let mut study = Study::new(&subject, knobs, goal, &graph, &paths.store, args.repeats);
     if !args.fresh && study.resume() && !args.quiet {
@@ -320,10 +336,15 @@ fn verdict(outcome: &Outcome) -> Result<(), Failure> {
     match outcome.goal {
         Goal::None => Ok(()),
         Goal::Tolerance(tolerance) if outcome.floor.is_some() && tolerance < outcome.floor() => failed(format!(
-            "the tolerance {}{unit} is below the floor of the {statistic}, {}{unit}: such an error cannot be claimed; give \
-             the knobs finer values",
+            "the tolerance {}{unit} is below the floor of the {statistic}, {}{unit}: such an error cannot be claimed; {}",
             brief(tolerance),
-            brief(outcome.floor())
+            brief(outcome.floor()),
+            if outcome.is_beyond {
+                "give the knobs finer values"
+            } else {
+                "the reference is exact, and the floor is the rounding of stored positions, which no value lowers: ask for more \
+                 than it, or move the scene closer to its origin"
+            }
         )),
         Goal::Tolerance(tolerance) => failed(format!(
             "no setting has a {statistic} of at most {}{unit}; the best is run {best} with {}{unit}",

@@ -12,6 +12,12 @@ use numerics::vector::to_f64;
 use super::nearest;
 use crate::stats::surface::{SurfaceStats, tet_volume};
 
+/// The words of `--norm` that are no attributes.
+const NORMS: [&str; 6] = ["points", "surface", "volume", "mean", "p99", "max"];
+
+/// The start of the message about an attribute that the output lacks.
+pub(super) const NO_ATTRIBUTE: &str = "the output has no attribute";
+
 /// What is compared.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Measure {
@@ -281,7 +287,13 @@ fn attribute(name: &str, a: &Geometry, b: &Geometry, into: &mut Vec<f64>) -> Res
     })?;
     match found {
         true => Ok(()),
-        false => Err(format!("the output has no attribute `{name}`; see `convect stats` for those it has")),
+        false => {
+            let columns = a.parts().flat_map(Component::columns).map(|(_, name, _)| &**name);
+            let near = engine::expr::suggest::nearest(name, NORMS.into_iter().chain(columns));
+            let hint =
+                near.map_or("see `convect stats` for those it has".into(), |near| format!("did you mean `{near}`?"));
+            Err(format!("{NO_ATTRIBUTE} `{name}`; {hint}"))
+        }
     }
 }
 
@@ -418,6 +430,8 @@ mod tests {
         measure.compare(&with([0.0, 3.0, 0.0]), &with([4.0, 0.0, 0.0]), &mut found).unwrap();
         assert_eq!(found, [5.0]);
         let unknown = Measure::Attribute("heat".into()).compare(&with([0.0; 3]), &with([0.0; 3]), &mut found);
-        assert!(unknown.unwrap_err().starts_with("the output has no attribute `heat`"));
+        assert_eq!(unknown.unwrap_err(), "the output has no attribute `heat`; see `convect stats` for those it has");
+        let mistyped = Measure::Attribute("volum".into()).compare(&with([0.0; 3]), &with([0.0; 3]), &mut found);
+        assert_eq!(mistyped.unwrap_err(), "the output has no attribute `volum`; did you mean `volume`?");
     }
 }

@@ -20,4 +20,5 @@ mod stats;
 #[cfg(unix)]
 mod stopped;
 mod study;
+mod study_extremes;
 mod targets;

@@ -214,7 +214,8 @@ fn a_tolerance_below_the_floor_or_out_of_reach_is_not_claimed() {
     let ran = bench.run(&["study", "g.json", "--knob", STEPS, "--tolerance", "1e-9", "--repeats", "1"]);
     assert_eq!(ran.code, Some(4));
     assert!(
-        ran.stderr.contains("the tolerance 1e-9 m is below the floor") && ran.stderr.contains("cannot be claimed"),
+        ran.stderr.contains("the tolerance 1e-9 m is below the floor")
+            && ran.stderr.contains("the rounding of stored positions, which no value lowers"),
         "{}",
         ran.stderr
     );
@@ -243,6 +244,14 @@ fn wrong_names_are_refused_with_what_was_meant() {
     refused(2, &["--knob", STEPS, "--output", "fur"], "the graph has no output `fur`");
     refused(2, &["--knob", STEPS, "--norm", "bent.nothing"], "has no metric `nothing`; it has `");
     refused(2, &["--knob", STEPS, "--norm", "heat"], "the output has no attribute `heat`");
+    refused(2, &["--knob", STEPS, "--norm", "volum"], "no attribute `volum`; did you mean `volume`?");
+    refused(
+        3,
+        &["--knob", "bent.rotation_steps=4,x"],
+        "--knob bent.rotation_steps:1:1: nodes.bent.params.rotation_steps: found",
+    );
+    refused(3, &["--knob", "bent.rotation_steps=4,4.5"], "--knob bent.rotation_steps");
+    refused(3, &["--knob", "bent.method=steps,exat"], "did you mean \"exact\"?");
     refused(2, &["--knob", "blades.cvs=2,4"], "use --norm surface");
 }
 

@@ -8,4 +8,3 @@ mod accuracy;
 mod accuracy_table;
 #[path = "../cooked/mod.rs"]
 mod cooked;
-mod extremes;

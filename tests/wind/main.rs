@@ -9,7 +9,6 @@ mod accuracy_table;
 mod coherence;
 #[path = "../cooked/mod.rs"]
 mod cooked;
-mod extremes;
 mod pictures;
 mod shelter;
 mod storm;

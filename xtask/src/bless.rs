@@ -18,6 +18,8 @@ pub(crate) enum Expectation {
     Readme,
     /// Tables of laws in docs/, and bits of the last frames of scenes with a solver: benches/graphs.txt
     Laws,
+    /// Outcomes of scenes at extremes: docs/stability.md
+    Stability,
     /// Counts of instructions, where valgrind is installed: benches/instructions.txt
     Instructions,
 }
@@ -31,6 +33,7 @@ impl Expectation {
             Self::Nodes => &["test", "-p", "xtask", "rendered_nodes"],
             Self::Readme => &["test", "--test", "catalogue", "readme_lists_the_catalogue"],
             Self::Laws => &["bench", "--bench", "laws", "--", "--bless"],
+            Self::Stability => &["test", "--test", "stability", "tables"],
             Self::Instructions => &["bench", "--bench", "instructions", "--", "--bless"],
         }
     }
@@ -43,6 +46,7 @@ impl Expectation {
             Self::Nodes => &["tests/new_nodes"],
             Self::Readme => &["README.md"],
             Self::Laws => &["docs/wind.md", "docs/softbody.md", "docs/liquid.md", "benches/graphs.txt"],
+            Self::Stability => &["docs/stability.md"],
             Self::Instructions => &["benches/instructions.txt"],
         }
     }

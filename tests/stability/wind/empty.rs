@@ -12,39 +12,41 @@ fn on(points: &[Point], triangles: &[[u32; 3]]) -> Scene {
     Scene::new().skin(move |_| mesh(&triangles, points.clone()))
 }
 
-#[test]
-fn empty_and_degenerate_curves_pass_through_every_node() {
+pub(super) fn empty_and_degenerate_curves_pass_through_every_node() {
     let root = [0.0, 0.5, 0.0];
-    let cooked = hold([
-        ("no curves", of(vec![])),
-        ("one CV", of(vec![vec![root]; 3])),
-        ("two equal CVs", of(vec![vec![root; 2], vec![root, root, [0.0, 0.8, 0.1]]])),
-        ("all CVs equal", of(vec![vec![root; 5]; 20])),
-        ("one curve of one, among others", of([vec![vec![root]], hairs(20, 5, 0.3)].concat())),
-        ("an empty mesh", on(&[], &[]).refused(&["grown"])),
-        ("one triangle", on(&[[-1.0, 0.0, -1.0], [0.0, 0.0, 1.0], [1.0, 0.0, -1.0]], &[[0, 1, 2]])),
-        ("one triangle without area", on(&[[-1.0, 0.0, 0.0], [0.0; 3], [1.0, 0.0, 0.0]], &[[0, 1, 2]])),
-        ("triangles that are points", on(&[[0.0, 0.4, 0.0]; 3], &[[0, 1, 2], [0, 0, 0]])),
-        ("no gusts", Scene::new().with("gusts", r#""num_gusts": 0"#)),
-    ]);
+    let cooked = hold(
+        "10",
+        [
+            ("no curves", of(vec![])),
+            ("#11: one CV", of(vec![vec![root]; 3])),
+            ("#12: two equal CVs", of(vec![vec![root; 2], vec![root, root, [0.0, 0.8, 0.1]]])),
+            ("#13: all CVs equal", of(vec![vec![root; 5]; 20])),
+            ("#11: a curve of one CV among others", of([vec![vec![root]], hairs(20, 5, 0.3)].concat())),
+            ("#15: an empty mesh", on(&[], &[]).refused(&["grown"])),
+            ("#16: one triangle", on(&[[-1.0, 0.0, -1.0], [0.0, 0.0, 1.0], [1.0, 0.0, -1.0]], &[[0, 1, 2]])),
+            ("#17: one triangle without area", on(&[[-1.0, 0.0, 0.0], [0.0; 3], [1.0, 0.0, 0.0]], &[[0, 1, 2]])),
+            ("#17: triangles that are points", on(&[[0.0, 0.4, 0.0]; 3], &[[0, 1, 2], [0, 0, 0]])),
+            ("#20: no gusts", Scene::new().with("gusts", r#""num_gusts": 0"#)),
+        ],
+    );
     let none = Scene::new().cook_some(&NODES, &[], 2);
     assert!(none.frames.is_empty() && none.errors.is_empty(), "no frames are no work");
+    page::record(PART, "20", "no frames", Outcome::Finite, "nothing is cooked");
     assert_eq!(cooked[0].of(2, "out").unwrap().point_count(), 0);
     assert_eq!(cooked[1].of(2, "out").unwrap().positions(), [root; 3], "a curve of one CV does not bend");
 }
 
-#[test]
-fn triangles_without_area_among_others_change_nothing() {
+pub(super) fn triangles_without_area_among_others_change_nothing() {
     let flat = Scene::new().skin(|_| ball_of(|all| [all, vec![[0, 0, 1], [5, 5, 5], [0, 1, 1]]].concat()));
-    let cooked = hold([("a ball", Scene::new()), ("a ball with triangles without area", flat)]);
+    let cooked =
+        hold("17", [("a ball without such triangles", Scene::new()), ("a ball with triangles without area", flat)]);
     for node in ["lee", "out"] {
         let [plain, flat] = [0, 1].map(|row: usize| cooked[row].of(2, node).unwrap());
         assert_eq!(plain.positions(), flat.positions());
     }
 }
 
-#[test]
-fn curves_without_a_skin_bend_and_swing() {
+pub(super) fn curves_without_a_skin_bend_and_swing() {
     let nodes = r#"
         "fur": { "type": "Curve_In", "params": { "points": [[0, 0, 0], [0, 1, 0], [0, 2, 0]] } },
         "gusts": { "type": "Curve_Wind_Gusts", "inputs": { "curves": "fur" }, "params": { "base": 0.5 } },
@@ -55,7 +57,9 @@ fn curves_without_a_skin_bend_and_swing() {
     let frames = cook(nodes, &["fur", "out"], 12);
     let [still, blown] = [0, 1].map(|output| frames[output][11].curves().unwrap());
     assert!(length_error(blown, still) <= 1e-5);
-    assert!((to_f64(blown.positions()[2]) - to_f64(still.positions()[2])).norm() > 0.1);
+    let moved = (to_f64(blown.positions()[2]) - to_f64(still.positions()[2])).norm();
+    assert!(moved > 0.1);
+    page::record(PART, "14", "curves without a skin", Outcome::Finite, &format!("the tip moves by {moved:.2} m"));
     for (node, input) in [("Curve_Attach", "rest_skin"), ("Curve_Interpolate", "skin")] {
         let curves = if node == "Curve_Attach" { "curves" } else { "guides" };
         let alone = format!(
@@ -64,5 +68,6 @@ fn curves_without_a_skin_bend_and_swing() {
         );
         let said = fault(&alone, "n").unwrap_or_default();
         assert!(said.contains(&format!("`{input}`")), "{said}");
+        record_refused("14", &format!("{node} without a skin"), &said);
     }
 }

@@ -1,4 +1,5 @@
 //! The wind nodes at extremes: absurd numbers, empty inputs, wind from any direction, difficult colliders.
+//! `GROUPS` lists the tables for `cargo bench --bench laws`.
 //!
 //! Each row of a table is a scene. The results of all its nodes are finite, keep lengths and roots, have envelopes in
 //! 0…1 and no uncounted crossings, and have the same bits on one thread and on seven; or the scene is refused, if the
@@ -7,7 +8,7 @@
 mod colliders;
 mod empty;
 mod numbers;
-mod wind;
+mod winds;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -23,6 +24,7 @@ use numerics::shapes::icosphere;
 use numerics::vector::{self, DVec3, to_f64};
 
 use crate::cooked::{fault, graph, metrics};
+use crate::page::{self, Outcome, split};
 
 type Point = [f32; 3];
 type At = Arc<dyn Fn(Frame) -> Geometry + Send + Sync>;
@@ -168,8 +170,17 @@ impl Cooked {
     }
 }
 
-/// Checks the guarantees of this module for every node in each of these scenes; returns the results.
-fn hold<const N: usize>(rows: [(&str, Scene); N]) -> Vec<Cooked> {
+/// The part of the page.
+const PART: &str = "Wind";
+
+/// Records a refusal.
+fn record_refused(rows: &str, case: &str, said: &str) {
+    page::record(PART, rows, case, Outcome::Refused, said);
+}
+
+/// Checks the guarantees of this module for every node in each of these scenes, and records them as `rows` of NUMERICS B, or
+/// as those that a scene's name begins with; returns the results.
+fn hold<const N: usize>(numbers: &str, rows: [(&str, Scene); N]) -> Vec<Cooked> {
     let held = rows.into_iter().map(|(what, scene)| {
         let cooked = scene.cook(1);
         assert!(cooked == scene.cook(7), "{what}: other bits on 7 threads than on one");
@@ -179,22 +190,34 @@ fn hold<const N: usize>(rows: [(&str, Scene); N]) -> Vec<Cooked> {
         }
         let wrong = scene.refused.iter().find(|node| !cooked.errors.iter().any(|(refused, ..)| refused == *node));
         assert_eq!(wrong, None, "{what}: it is not refused");
-        check_all(what, &cooked, &scene);
+        let worst = check_all(what, &cooked, &scene);
+        let (numbers, case) = split(numbers, what);
+        match cooked.errors.first() {
+            Some((_, _, said)) => record_refused(numbers, case, said),
+            None => {
+                let most = |name: &str| cooked.counts[name].iter().copied().fold(0.0, f64::max);
+                let (left, contacts) = (most("crossings_left"), most("contacts"));
+                let outcome = if left > 0.0 { Outcome::Capped } else { Outcome::Finite };
+                let figure = format!("lengths within {worst:.0e}, {contacts} contacts, {left} crossings left");
+                page::record(PART, numbers, case, outcome, &figure);
+            }
+        }
         cooked
     });
     held.collect()
 }
 
-/// Checks all frames of an outcome.
-fn check_all(what: &str, cooked: &Cooked, scene: &Scene) {
-    for frame in 0..3 {
+/// Checks all frames of an outcome; returns the largest change of a length.
+fn check_all(what: &str, cooked: &Cooked, scene: &Scene) -> f64 {
+    let of_frame = |frame: usize| {
         let at = Frame::whole(frame as i64 + 1);
-        check(&format!("{what}, frame {}", frame + 1), cooked, frame, (scene.fur)(at), (scene.skin)(at));
-    }
+        check(&format!("{what}, frame {}", frame + 1), cooked, frame, (scene.fur)(at), (scene.skin)(at))
+    };
+    (0..3).map(of_frame).fold(0.0, f64::max)
 }
 
-fn check(what: &str, cooked: &Cooked, frame: usize, fur: Geometry, skin: Geometry) {
-    let fur = fur.curves().unwrap();
+fn check(what: &str, cooked: &Cooked, frame: usize, fur: Geometry, skin: Geometry) -> f64 {
+    let (fur, mut worst) = (fur.curves().unwrap(), 0.0_f64);
     for node in NODES {
         let Some(made) = cooked.of(frame, node) else { continue };
         assert!(made.positions().as_flattened().iter().all(|x| x.is_finite()), "{what}: `{node}`");
@@ -205,6 +228,7 @@ fn check(what: &str, cooked: &Cooked, frame: usize, fur: Geometry, skin: Geometr
             assert_eq!(made.runs(), fur.runs(), "{what}: `{node}`");
             let error = length_error(made, fur);
             assert!(error <= 1e-5, "{what}: `{node}` changes lengths by {error:.1e} of a curve's");
+            worst = worst.max(error);
         }
         if ["wind", "swing"].contains(&node) {
             let roots =
@@ -216,6 +240,7 @@ fn check(what: &str, cooked: &Cooked, frame: usize, fur: Geometry, skin: Geometr
         let (found, counted) = (crossings(out, skin.mesh().unwrap()), cooked.counts["crossings_left"][frame]);
         assert!(found as f64 <= counted, "{what}: {found} segments cross, {counted} were counted");
     }
+    worst
 }
 
 /// The largest change of a segment's length beyond the rounding of stored positions, relative to the curve's length.
@@ -331,4 +356,23 @@ fn moved(mut geometry: Geometry, change: impl Fn(Point) -> Point) -> Geometry {
         }
     }
     geometry
+}
+
+crate::page::groups! {
+    colliders::curves_that_start_inside_a_collider_are_counted_and_do_not_get_deeper,
+    colliders::no_kind_of_collider_is_crossed,
+    colliders::extreme_steps_and_offsets_keep_the_guarantees,
+    empty::empty_and_degenerate_curves_pass_through_every_node,
+    empty::triangles_without_area_among_others_change_nothing,
+    empty::curves_without_a_skin_bend_and_swing,
+    numbers::scenes_of_any_scale_and_position_are_finite_and_keep_lengths,
+    numbers::any_frame_rate_gives_finite_curves,
+    numbers::nan_and_infinity_are_refused_by_name_in_every_input,
+    numbers::lengths_roots_and_bits_are_kept_at_both_ends_of_every_range,
+    winds::wind_from_any_direction_bends_curves_and_keeps_their_lengths,
+    winds::envelopes_out_of_range_and_thousands_of_gusts_give_finite_curves,
+    winds::springs_of_any_stiffness_and_damping_are_stable,
+    winds::every_node_handles_curves_of_2_and_of_10_000_cvs,
+    winds::a_million_curves_pass_through_the_chain,
+    winds::a_million_curves_are_attached_and_interpolated,
 }

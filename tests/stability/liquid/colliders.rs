@@ -11,8 +11,7 @@ fn pool_and(nodes: &str) -> &'static str {
     format!("{POOL},{nodes}").leak()
 }
 
-#[test]
-fn extreme_motions_of_colliders_are_met_or_told() {
+pub(super) fn extreme_motions_of_colliders_are_met_or_told() {
     let ball = r#""ball": { "type": "Mesh_Primitive", "params": { "shape": "sphere", "size": [0.3, 0.3, 0.3], "divisions": 4 } },"#;
     let moved = |translate: &str| {
         pool_and(&format!(
@@ -20,7 +19,7 @@ fn extreme_motions_of_colliders_are_met_or_told() {
         ))
     };
     let met = r#""liquid": ["pool"], "colliders": ["solid"]"#;
-    hold(vec![
+    hold("47", vec![
         row(
             "a ball at 10 cells a frame through a pool",
             moved(r#"{ "keyframes": [[1, [-0.3, 0.3, 0.5]], [3, [1.36, 0.3, 0.5]]] }"#),
@@ -30,7 +29,7 @@ fn extreme_motions_of_colliders_are_met_or_told() {
         .fastest(60.0)
         .drift(0.3),
         row(
-            "the same, 1e5 Pa·s",
+            "a ball at 10 cells a frame through a pool of 1e5 Pa·s",
             moved(r#"{ "keyframes": [[1, [-0.3, 0.3, 0.5]], [3, [1.36, 0.3, 0.5]]] }"#),
             met,
             r#""viscosity": 1e5"#,
@@ -44,8 +43,7 @@ fn extreme_motions_of_colliders_are_met_or_told() {
     ]);
 }
 
-#[test]
-fn extreme_places_of_colliders_are_met_or_told() {
+pub(super) fn extreme_places_of_colliders_are_met_or_told() {
     let solid = |size: &str, translate: &str| {
         format!(
             r#""solid_shape": {{ "type": "Mesh_Primitive", "params": {{ "size": {size}, "divisions": 1 }} }},
@@ -57,7 +55,7 @@ fn extreme_places_of_colliders_are_met_or_told() {
             .leak()
     };
     let met = r#""liquid": ["pool"], "colliders": ["solid"]"#;
-    hold(vec![
+    hold("47", vec![
         row(
             "a piston squeezes a full box",
             full(solid("[2, 0.6, 2]", r#"{ "keyframes": [[1, [0.5, 1.3, 0.5]], [6, [0.5, 1, 0.5]]] }"#)),
@@ -86,18 +84,24 @@ fn mesh(points: &[[f32; 3]], triangles: &[[u32; 3]]) -> Component {
     Component::mesh(vec![3; triangles.len()], triangles.concat(), points.to_vec()).unwrap()
 }
 
-#[test]
-fn extremely_small_meshes_are_colliders_too() {
+pub(super) fn extremely_small_meshes_are_colliders_too() {
     let met = r#""liquid": ["pool"], "colliders": ["solid"]"#;
     let against = |what, points: &[[f32; 3]], triangles: &[[u32; 3]]| {
         row(what, POOL, met, "").given("solid", mesh(points, triangles)).drift(0.05)
     };
     let line = [[0.2, 0.3, 0.5], [0.5, 0.3, 0.5], [0.8, 0.3, 0.5]];
-    hold(vec![
-        against("a collider without points", &[], &[]),
-        against("a collider without faces", &line, &[]),
-        against("a collider of a triangle without area", &line, &[[0, 1, 2]]),
-        against("a collider of a triangle that is a point", &[[0.5, 0.3, 0.5]; 3], &[[0, 1, 2], [0, 0, 0]]),
-        against("a collider of one triangle", &[[0.2, 0.3, 0.2], [0.5, 0.35, 0.8], [0.8, 0.3, 0.2]], &[[0, 1, 2]]),
-    ]);
+    hold(
+        "15",
+        vec![
+            against("a collider without points", &[], &[]),
+            against("a collider without faces", &line, &[]),
+            against("#17: a collider of a triangle without area", &line, &[[0, 1, 2]]),
+            against("#17: a collider of a triangle that is a point", &[[0.5, 0.3, 0.5]; 3], &[[0, 1, 2], [0, 0, 0]]),
+            against(
+                "#16: a collider of one triangle",
+                &[[0.2, 0.3, 0.2], [0.5, 0.35, 0.8], [0.8, 0.3, 0.2]],
+                &[[0, 1, 2]],
+            ),
+        ],
+    );
 }

@@ -3,7 +3,6 @@
 //! Each row of a table is a graph. It is refused for the reason that the row names, or every frame is finite, stays in its
 //! box, encloses what it should to within the row's share, moves no faster than the row allows, takes a bounded number of
 //! substeps, gives the notes that the row names, and has the same bits on one thread and on five.
-//! `cargo test --test liquid extreme -- --nocapture` prints the table.
 
 mod boxes;
 mod colliders;
@@ -25,12 +24,18 @@ use engine::time::Frame;
 use numerics::vector::length;
 
 use crate::cooked::{fault, graph, metrics};
+use crate::page::{self, Outcome, split};
 
 /// Cells along the side of the box of 1 m.
 const CELLS: f64 = 12.0;
 
+/// The part of the page.
+const PART: &str = "Liquids";
+
 /// Frames cooked.
-const FRAMES: i64 = 6;
+fn frames() -> i64 {
+    page::frames(6)
+}
 
 /// A graph, and what is expected of it.
 struct Row {
@@ -114,7 +119,7 @@ impl Row {
     }
 
     fn cook(&self, threads: usize) -> Cooked {
-        let mut graph = graph(&self.text(), &["solve.surface", "solve.particles", "solve.volume"], FRAMES);
+        let mut graph = graph(&self.text(), &["solve.surface", "solve.particles", "solve.volume"], frames());
         graph.scene.fps = self.fps;
         for (name, mesh) in &self.given {
             let geometry: Geometry = mesh.clone().into();
@@ -126,7 +131,7 @@ impl Row {
             ceiling: Ceiling { bytes: self.memory, set_by: "the row allows" },
             ..Settings::default()
         };
-        let frames: Vec<Frame> = (1..=FRAMES).map(Frame::whole).collect();
+        let frames: Vec<Frame> = (1..=frames()).map(Frame::whole).collect();
         let (found, mut report) = cook_all(&Engine::new(&settings).unwrap(), &graph, &frames);
         let errors = report.errors.iter().map(|(_, error, _)| (error.error.kind, error.to_string())).collect();
         let notes = std::mem::take(&mut report.notes);
@@ -135,8 +140,8 @@ impl Row {
         Cooked { outputs: [0, 1, 2].map(made), metrics, notes, errors }
     }
 
-    /// What a table says of it, or how it is wrong.
-    fn outcome(&self) -> Result<String, String> {
+    /// What the page says of it, or how it is wrong.
+    fn outcome(&self) -> Result<(Outcome, String), String> {
         if let Some(fault) = fault(&self.text(), "solve") {
             return self.refusal(&[(ErrorKind::Refused, fault)]);
         }
@@ -153,11 +158,11 @@ impl Row {
         cooked.check(self)
     }
 
-    fn refusal(&self, errors: &[(ErrorKind, String)]) -> Result<String, String> {
+    fn refusal(&self, errors: &[(ErrorKind, String)]) -> Result<(Outcome, String), String> {
         let (kind, said) = &errors[0];
         match self.refused {
             Some(words) if matches!(kind, ErrorKind::Refused | ErrorKind::NotFinite) && said.contains(words) => {
-                Ok(format!("refused: {words}"))
+                Ok((Outcome::Refused, said.clone()))
             }
             _ => Err(said.clone()),
         }
@@ -186,7 +191,7 @@ impl Cooked {
         self.metric(name).into_iter().fold(0.0, |most, x| most.max(x.abs()))
     }
 
-    fn check(&self, row: &Row) -> Result<String, String> {
+    fn check(&self, row: &Row) -> Result<(Outcome, String), String> {
         if let Some((name, _)) = self.metrics.iter().find(|(_, values)| values.values().any(|x| !x.is_finite())) {
             return Err(format!("`{name}` is not finite"));
         }
@@ -225,7 +230,11 @@ impl Cooked {
             faults.push(format!("no note is about `{metric}`"));
         }
         let told = self.told(fastest, drift);
-        if faults.is_empty() { Ok(told) } else { Err(format!("{}: {told}", faults.join(", "))) }
+        // Most scenes are of boxes that reach beyond the walls, which changes nothing.
+        let is_noted =
+            self.notes.iter().any(|note| self.metrics.contains_key(note.kind) && note.kind != "liquid_outside");
+        let outcome = if is_noted { Outcome::Capped } else { Outcome::Finite };
+        if faults.is_empty() { Ok((outcome, told)) } else { Err(format!("{}: {told}", faults.join(", "))) }
     }
 
     /// What is there at the end or went, m³, and how far that is from what there was and came, as a share of it.
@@ -250,13 +259,29 @@ impl Cooked {
     }
 }
 
-/// Prints the rows, and checks them.
-fn hold(rows: Vec<Row>) {
+/// Checks the rows, and records them as `numbers` of NUMERICS B, or as those that a row's name begins with.
+fn hold(numbers: &str, rows: Vec<Row>) {
     let mut wrong = Vec::new();
     for row in rows {
-        let (Ok(outcome) | Err(outcome)) =
-            row.outcome().inspect_err(|fault| wrong.push(format!("{}: {fault}", row.what)));
-        println!("| {} | {outcome} |", row.what);
+        let (numbers, case) = split(numbers, row.what);
+        match row.outcome() {
+            Ok((outcome, told)) => page::record(PART, numbers, case, outcome, &told),
+            Err(fault) => wrong.push(format!("{}: {fault}", row.what)),
+        }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+crate::page::groups! {
+    boxes::extreme_steps_are_cut_and_capped,
+    boxes::extreme_boxes_are_solved_or_refused,
+    boxes::extreme_departures_from_the_box_are_told,
+    colliders::extreme_motions_of_colliders_are_met_or_told,
+    colliders::extreme_places_of_colliders_are_met_or_told,
+    colliders::extremely_small_meshes_are_colliders_too,
+    liquids::extreme_viscosities_are_solved,
+    liquids::extremely_thin_liquid_is_carried_or_told,
+    liquids::extremely_many_tracers_in_a_cell_are_carried,
+    openings::extreme_sources_give_or_tell,
+    openings::extreme_sinks_take_or_tell,
 }

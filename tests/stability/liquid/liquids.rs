@@ -20,32 +20,33 @@ const TWO_LIQUIDS: &str = r#"
 
 const LIQUID: &str = r#""liquid": ["drop", "pool"]"#;
 
-#[test]
-fn extreme_viscosities_are_solved() {
+pub(super) fn extreme_viscosities_are_solved() {
     let splash = |what, params| row(what, SPLASH, LIQUID, params).drift(0.05);
-    hold(vec![
-        splash("viscosity 0", r#""viscosity": 0"#),
-        splash("viscosity 1e-9 Pa·s", r#""viscosity": 1e-9"#),
-        splash("viscosity 1e9 Pa·s", r#""viscosity": 1e9"#),
-        splash("viscosity 1e15 Pa·s", r#""viscosity": 1e15"#),
-        splash("viscosity 1e30 Pa·s", r#""viscosity": 1e30"#),
-        splash(
-            "viscosity from 1e-3 to 1e5 Pa·s in a frame, and back",
-            r#""viscosity": { "keyframes": [[2, 1e-3], [3, 1e5], [4, 1e5], [5, 1e-3]] }"#,
-        ),
-        row("1e5 Pa·s in 1e-3 Pa·s", TWO_LIQUIDS, r#""liquid": ["thin", "thick"]"#, "").drift(0.05),
-        splash("density 1e-6 kg/m³", r#""density": 1e-6"#),
-        splash("density 1e9 kg/m³", r#""density": 1e9"#),
-        splash("`slip` 1 at 1e9 Pa·s", r#""viscosity": 1e9, "slip": 1"#),
-        splash("viscosity after pressure, at 1e9 Pa·s", r#""viscosity": 1e9, "stokes": "off""#),
-        splash("viscosity below 0", r#""viscosity": -1"#).refused("viscosity"),
-    ]);
+    hold(
+        "45",
+        vec![
+            splash("viscosity 0", r#""viscosity": 0"#),
+            splash("viscosity 1e-9 Pa·s", r#""viscosity": 1e-9"#),
+            splash("viscosity 1e9 Pa·s", r#""viscosity": 1e9"#),
+            splash("viscosity 1e15 Pa·s", r#""viscosity": 1e15"#),
+            splash("viscosity 1e30 Pa·s", r#""viscosity": 1e30"#),
+            splash(
+                "viscosity from 1e-3 to 1e5 Pa·s in a frame, and back",
+                r#""viscosity": { "keyframes": [[2, 1e-3], [3, 1e5], [4, 1e5], [5, 1e-3]] }"#,
+            ),
+            row("1e5 Pa·s in 1e-3 Pa·s", TWO_LIQUIDS, r#""liquid": ["thin", "thick"]"#, "").drift(0.05),
+            splash("#7: density 1e-6 kg/m³", r#""density": 1e-6"#),
+            splash("#7: density 1e9 kg/m³", r#""density": 1e9"#),
+            splash("`slip` 1 at 1e9 Pa·s", r#""viscosity": 1e9, "slip": 1"#),
+            splash("viscosity after pressure, at 1e9 Pa·s", r#""viscosity": 1e9, "stokes": "off""#),
+            splash("viscosity below 0", r#""viscosity": -1"#).refused("viscosity"),
+        ],
+    );
 }
 
-#[test]
-fn extremely_thin_liquid_is_carried_or_told() {
+pub(super) fn extremely_thin_liquid_is_carried_or_told() {
     let sized = |what, nodes| row(what, nodes, r#""liquid": ["placed"]"#, r#""viscosity": 1"#);
-    hold(vec![
+    hold("46", vec![
         sized(
             "a sheet of half a cell",
             r#""shape": { "type": "Mesh_Primitive", "params": { "size": [0.6, 0.04, 0.6], "divisions": 1 } },
@@ -90,8 +91,7 @@ fn extremely_thin_liquid_is_carried_or_told() {
 }
 
 /// A thousand points in one cell of liquid.
-#[test]
-fn extremely_many_tracers_in_a_cell_are_carried() {
+pub(super) fn extremely_many_tracers_in_a_cell_are_carried() {
     let points: Vec<String> = (0..1000).map(|n| format!("[0.51, 0.2{:02}, 0.52]", n % 50)).collect();
     let nodes = format!(
         r#""box": {{ "type": "Mesh_Primitive", "params": {{ "size": [2, 0.8, 2], "divisions": 1 }} }},
@@ -99,10 +99,13 @@ fn extremely_many_tracers_in_a_cell_are_carried() {
         points.join(", ")
     );
     let nodes: &'static str = nodes.leak();
-    hold(vec![row(
-        "a thousand tracers in a cell",
-        nodes,
-        r#""liquid": ["box"], "tracers": ["dots"]"#,
-        r#""gravity": [3, -9, 0]"#,
-    )]);
+    hold(
+        "54",
+        vec![row(
+            "a thousand tracers in a cell",
+            nodes,
+            r#""liquid": ["box"], "tracers": ["dots"]"#,
+            r#""gravity": [3, -9, 0]"#,
+        )],
+    );
 }

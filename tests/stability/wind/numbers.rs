@@ -29,29 +29,32 @@ fn scaled(scale: f64) -> Scene {
         .with("hairs", format!(r#""density": {}"#, 20.0 / (scale * scale)))
 }
 
-#[test]
-fn scenes_of_any_scale_and_position_are_finite_and_keep_lengths() {
-    hold([
-        ("1e-6", scaled(1e-6)),
-        ("1e6", scaled(1e6)),
-        ("1e-6, params as they are", changed(|p| p.map(|x| x * 1e-6))),
-        ("1e6, params as they are", changed(|p| p.map(|x| x * 1e6)).with("hairs", r#""density": 1e-11"#)),
-        ("1e-30", changed(|p| p.map(|x| x * 1e-30))),
-        ("1e30", changed(|p| p.map(|x| x * 1e30)).with("hairs", r#""density": 1e-45"#).refused(&["hairs"])),
-        ("denormal", changed(|p| p.map(|x| x * 1e-41))),
-        ("1e7 m away", changed(|p| [p[0] + 1e7, p[1] - 1e7, p[2] + 1e7])),
-        ("1 km away", changed(|p| [p[0] + 900.0, p[1], p[2] - 400.0])),
-    ]);
+pub(super) fn scenes_of_any_scale_and_position_are_finite_and_keep_lengths() {
+    hold(
+        "6",
+        [
+            ("scene × 1e-6", scaled(1e-6)),
+            ("scene × 1e6", scaled(1e6)),
+            ("scene × 1e-6, params as they are", changed(|p| p.map(|x| x * 1e-6))),
+            ("scene × 1e6, params as they are", changed(|p| p.map(|x| x * 1e6)).with("hairs", r#""density": 1e-11"#)),
+            ("#4: scene × 1e-30", changed(|p| p.map(|x| x * 1e-30))),
+            (
+                "#4: scene × 1e30",
+                changed(|p| p.map(|x| x * 1e30)).with("hairs", r#""density": 1e-45"#).refused(&["hairs"]),
+            ),
+            ("#3: denormal positions", changed(|p| p.map(|x| x * 1e-41))),
+            ("#5: 1e7 m away", changed(|p| [p[0] + 1e7, p[1] - 1e7, p[2] + 1e7])),
+            ("#5: 1 km away", changed(|p| [p[0] + 900.0, p[1], p[2] - 400.0])),
+        ],
+    );
 }
 
-#[test]
-fn any_frame_rate_gives_finite_curves() {
+pub(super) fn any_frame_rate_gives_finite_curves() {
     let at = |fps: f64| Scene { fps, ..Scene::new() };
-    hold([("a frame of 1,000 s", at(1e-3)), ("a frame of 1 µs", at(1e6))]);
+    hold("9", [("a frame of 1,000 s", at(1e-3)), ("a frame of 1 µs", at(1e6))]);
 }
 
-#[test]
-fn nan_and_infinity_are_refused_by_name_in_every_input() {
+pub(super) fn nan_and_infinity_are_refused_by_name_in_every_input() {
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         for name in ["P", "envelope", "Pref", "soft"] {
             let scene = Scene::new().fur(move |_| {
@@ -73,6 +76,7 @@ fn nan_and_infinity_are_refused_by_name_in_every_input() {
                 node == "fur" && *kind == ErrorKind::NotFinite && error.contains(&expected)
             }));
             assert!(!cooked.errors.is_empty() && cooked.frames.iter().flatten().all(Option::is_none), "{name} {bad}");
+            record_refused(if bad.is_nan() { "1" } else { "2" }, &format!("{bad} in `{name}`"), &cooked.errors[0].2);
         }
     }
 }
@@ -87,9 +91,8 @@ fn json(value: &Value) -> Option<String> {
     }
 }
 
-#[test]
-fn lengths_roots_and_bits_are_kept_at_both_ends_of_every_range() {
-    let mut ends = 0;
+pub(super) fn lengths_roots_and_bits_are_kept_at_both_ends_of_every_range() {
+    let (mut ends, mut refusals) = (0, 0);
     let scene = graph(&Scene::new().nodes(), &NODES, 1);
     // The nodes whose params a scene can set.
     let ids: Vec<&'static str> = Scene::new().params.into_keys().collect();
@@ -111,8 +114,11 @@ fn lengths_roots_and_bits_are_kept_at_both_ends_of_every_range() {
                 assert!(refused, "{what}: {:?}", cooked.errors);
                 check_all(&what, &cooked, &at_end);
                 ends += 1;
+                refusals += usize::from(!cooked.errors.is_empty());
             }
         }
     }
     assert!(ends > 40, "{ends}");
+    let figure = format!("{ends} ends, of which {refusals} are refused for this scene");
+    page::record(PART, "7", "every param of the chain at both ends of its range", Outcome::Finite, &figure);
 }
