@@ -279,7 +279,7 @@ def arrays(stage, prim, part, time):
         ours = None if found is None else np.array(found, dtype=np.float64).astype(dtype).reshape(theirs.shape)
         # USD interpolates halves in halves, which is coarser.
         of_halves = "half" in name and len(primvar.GetTimeSamples()) > 1
-        tolerance = near if name == "of_vector3f" else 2e-3 if of_halves else 0
+        tolerance = near if name == "of_vector3f" else 1e-2 if of_halves else 0
         yield name, ours, theirs, tolerance
 
 

@@ -21,3 +21,4 @@ mod stats;
 mod stopped;
 mod study;
 mod targets;
+mod usd;
