@@ -1,8 +1,9 @@
 //! `convect convert`: converts a geometry file or a numbered sequence to another format.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use engine::geometry::Geometry;
 use engine::time::Frame;
@@ -14,11 +15,13 @@ use crate::failure::{Exit, Failure, cancelled_by_signal};
 use crate::geometry_file::{Numbered, folder_of, read, refused, sequence_in, stem_and_frame};
 use crate::output::{create_folder, usd_failed, write_whole};
 use crate::targets::Targets;
+use crate::usd_file::{UsdFile, is_usd};
 
 /// The arguments of `convert`.
 #[derive(Debug, clap::Args)]
 pub struct ConvertArgs {
-    /// An obj, ply or json file, a numbered sequence: fur.####.json, or a folder that holds one sequence
+    /// An obj, ply, json or USD file, a numbered sequence: fur.####.json, or a folder that holds one sequence. A USD file
+    /// has a frame for each time at which it has samples
     from: PathBuf,
     /// The file to write; its extension selects the format. A sequence becomes one usdc or usda file, or one file per
     /// frame: fur.####.ply. Its folder is created if it is missing
@@ -26,9 +29,12 @@ pub struct ConvertArgs {
     /// Factor for lengths and velocities, such as 0.01 for a file in centimetres
     #[arg(long, value_name = "S", default_value_t = 1.0, hide_default_value = true, value_parser = positive)]
     scale: f64,
-    /// Frames per second, for the time in usdc, usda and json files
-    #[arg(long, value_name = "N", default_value_t = 24.0, value_parser = positive)]
-    fps: f64,
+    /// Frames per second, for the time in usdc, usda and json files; 24 by default, of a USD file its own
+    #[arg(long, value_name = "N", value_parser = positive)]
+    fps: Option<f64>,
+    /// The prim of a USD file that is converted, with all under it: /set/fur
+    #[arg(long, value_name = "PATH")]
+    prim: Option<String>,
     /// Print only errors
     #[arg(short, long)]
     quiet: bool,
@@ -47,7 +53,13 @@ pub fn run(args: &ConvertArgs) -> Result<(), Failure> {
     let command_line = |line: String| Failure::new(Exit::CommandLine, line);
     let format =
         Format::of_path(&args.to).map_err(|error| command_line(format!("`{}`: {error}", args.to.display())))?;
+    let stage = match is_usd(&args.from) && Numbered::of(&args.from)?.is_none() {
+        true => Some(UsdFile::open(&args.from, args.prim.as_deref().unwrap_or_default())?),
+        false if args.prim.is_some() => return Err(command_line("only a USD file has prims".into())),
+        false => None,
+    };
     let files = match Numbered::of(&args.from)? {
+        _ if stage.is_some() => moments(stage.as_ref(), &args.from)?,
         Some(numbered) => numbered.find()?,
         None if args.from.is_dir() => sequence_in(&args.from)?,
         None => vec![(stem_and_frame(&args.from).1.unwrap_or(Frame::whole(1)), args.from.clone())],
@@ -63,7 +75,12 @@ pub fn run(args: &ConvertArgs) -> Result<(), Failure> {
     targets.check()?;
     targets.sweep();
     create_folder(folder_of(&args.to))?;
-    let conversion = Conversion { format, scale: args.scale, fps: args.fps, cancel };
+    let fps = match (args.fps, &stage) {
+        (Some(fps), _) => fps,
+        (None, Some(stage)) => stage.fps()?,
+        (None, None) => 24.0,
+    };
+    let conversion = Conversion { format, scale: args.scale, fps, cancel, stage, left_out: Mutex::default() };
     let written = match &to {
         Some(to) => conversion.file_per_frame(&files, |frame| to.at(frame), to.stem())?,
         None if format.is_sequence() => conversion.one_file(&files, &args.to, &stem_and_frame(&args.to).0)?,
@@ -71,8 +88,22 @@ pub fn run(args: &ConvertArgs) -> Result<(), Failure> {
     };
     if !args.quiet {
         print_summary(&written);
+        let left_out = conversion.left_out.into_inner().unwrap_or_else(PoisonError::into_inner);
+        left_out.iter().for_each(|note| crate::say!("note: {note}"));
     }
     Ok(())
+}
+
+/// The frames of a USD file: its times, or 1 if nothing moves.
+fn moments(stage: Option<&UsdFile>, path: &Path) -> Result<Vec<(Frame, PathBuf)>, Failure> {
+    let times = stage.map_or(&[][..], |stage| &stage.times);
+    let frame = |time: &f64| {
+        let frame = Frame::exactly(*time).map(|frame| (frame, path.to_owned()));
+        frame.map_err(|error| {
+            Failure::file(format!("`{}`: it has a sample at {time}, which is no frame: {error}", path.display()))
+        })
+    };
+    if times.is_empty() { Ok(vec![(Frame::whole(1), path.to_owned())]) } else { times.iter().map(frame).collect() }
 }
 
 /// Everything that the conversion reads and writes.
@@ -125,6 +156,10 @@ struct Conversion {
     fps: f64,
     /// Set by Ctrl-C.
     cancel: Arc<AtomicBool>,
+    /// The USD file that is converted.
+    stage: Option<UsdFile>,
+    /// What of it was left out.
+    left_out: Mutex<BTreeSet<String>>,
 }
 
 impl Conversion {
@@ -134,7 +169,7 @@ impl Conversion {
         let mut writer = UsdWriter::create(to, flavour, name, self.fps, [0.0; 3]).map_err(usd_failed)?;
         let mut without_width = false;
         for some in files.chunks(rayon::current_num_threads()) {
-            let read = parallel::map(some, |_, (_, path)| self.read(path));
+            let read = parallel::map(some, |_, (frame, path)| self.read(*frame, path));
             for (geometry, (frame, _)) in read.into_iter().zip(some) {
                 let geometry = geometry?;
                 without_width |= lacks_width(&geometry);
@@ -173,7 +208,7 @@ impl Conversion {
     }
 
     fn one_frame(&self, (frame, from): &(Frame, PathBuf), to: PathBuf) -> Result<Written, Failure> {
-        let geometry = self.read(from)?;
+        let geometry = self.read(*frame, from)?;
         let stamp = FrameStamp { frame: frame.number(), seconds: frame.seconds(self.fps) };
         let mut bytes = Vec::new();
         formats::write(self.format, &geometry, &stamp, &mut bytes).map_err(|error| refused(&to, &error))?;
@@ -182,12 +217,16 @@ impl Conversion {
         Ok(Written { files: vec![to], frames: 1, bytes: bytes.len() as u64, lost, without_width: false })
     }
 
-    /// Reads a file and scales it; fails after Ctrl-C.
-    fn read(&self, path: &Path) -> Result<Geometry, Failure> {
+    /// Reads a file, or a frame of a USD file, and scales it; fails after Ctrl-C.
+    fn read(&self, frame: Frame, path: &Path) -> Result<Geometry, Failure> {
         if self.cancel.load(Ordering::Relaxed) {
             return Err(Failure::new(Exit::Interrupted, "interrupted; the files written so far are complete"));
         }
-        let mut geometry = read(path)?.geometry;
+        let (mut geometry, notes) = match &self.stage {
+            Some(stage) => stage.read(frame.number()).map(|reading| (reading.geometry, reading.notes))?,
+            None => read(path).map(|file| (file.geometry, file.notes))?,
+        };
+        self.left_out.lock().unwrap_or_else(PoisonError::into_inner).extend(notes);
         if let Some(kind) = geometry.kinds().find(|kind| !self.format.holds(*kind)) {
             return Err(refused(path, &FormatError::CannotHold { format: self.format, kind }));
         }

@@ -1,7 +1,7 @@
 //! Geometry files named on the command line, and the frame numbers in their names.
 //!
-//! A run of `#` in a [`Numbered`] name is replaced by the frame number, as in a graph. Limit: files are read as a
-//! whole, and USD is not read.
+//! A run of `#` in a [`Numbered`] name is replaced by the frame number, as in a graph. USD files are read at one time here;
+//! see [`UsdFile`] for all. Limit: other files are read as a whole.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,33 +14,52 @@ use formats::Format;
 use formats::atomic::FileError;
 
 use crate::failure::{Exit, Failure};
+use crate::usd_file::{UsdFile, is_usd};
 
 /// A geometry file that was read.
 #[derive(Debug)]
 pub struct GeometryFile {
     /// Its format, by its extension.
-    pub format: Format,
+    pub format: &'static str,
     /// Its size.
     pub bytes: u64,
     /// Its geometry.
     pub geometry: Geometry,
+    /// Of a USD file, the time at which it was read and how many it has samples at.
+    pub time: Option<(f64, usize)>,
+    /// What of a USD file was left out.
+    pub notes: Vec<String>,
 }
 
-/// Reads the file at `path`.
+/// Reads the file at `path`; a USD file at its first time.
 ///
 /// # Errors
 /// If it cannot be read or is not a file of the format of its extension.
 pub fn read(path: &Path) -> Result<GeometryFile, Failure> {
+    if is_usd(path) { read_usd(path, "", None) } else { read_whole(path) }
+}
+
+/// Reads the prim at the path `prim` of a USD file and all under it, at a time code; at its first one if none is given.
+///
+/// # Errors
+/// If it cannot be read or has no such prim.
+pub fn read_usd(path: &Path, prim: &str, time: Option<f64>) -> Result<GeometryFile, Failure> {
+    let file = UsdFile::open(path, prim)?;
+    let time = time.unwrap_or(file.first());
+    let formats::usd::UsdReading { geometry, notes } = file.read(time)?;
+    Ok(GeometryFile { format: file.format, bytes: file.bytes, geometry, time: Some((time, file.times.len())), notes })
+}
+
+fn read_whole(path: &Path) -> Result<GeometryFile, Failure> {
     let unread = |error: io::Error| Failure::file(FileError::new(path, "read", error).to_string());
     let mut file = engine::files::open(path).map_err(unread)?;
     let refused = |error| refused(path, &error);
     let format = Format::of_path(path).map_err(refused)?;
     let mut bytes = Vec::new();
-    if format.is_read() {
-        file.read_to_end(&mut bytes).map_err(unread)?;
-    }
+    file.read_to_end(&mut bytes).map_err(unread)?;
     let geometry = formats::read(format, &bytes).map_err(refused)?;
-    Ok(GeometryFile { format, bytes: bytes.len() as u64, geometry })
+    let (format, bytes) = (format.name(), bytes.len() as u64);
+    Ok(GeometryFile { format, bytes, geometry, time: None, notes: Vec::new() })
 }
 
 /// The failure of a file that its format refuses, with the hint.

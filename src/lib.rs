@@ -34,6 +34,7 @@ pub mod schema;
 pub mod stats;
 pub mod study;
 pub mod targets;
+pub mod usd_file;
 
 use engine::graph::Catalogue;
 use engine::node::Node;

@@ -27,6 +27,7 @@ pub fn bench(node: &'static Node) -> Bench {
     let params = specs.iter().map(|spec| match spec.facts.unset {
         Unset::Default => Source::Constant(spec.default.clone()),
         Unset::CurrentFrame => Source::CurrentFrame,
+        Unset::CurrentTime => Source::CurrentTime,
         Unset::SceneStart => Source::Constant(Value::Int(scene.first)),
     });
     Bench {

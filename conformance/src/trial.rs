@@ -154,6 +154,7 @@ impl Subject {
     fn unset(&self, spec: &ParamSpec) -> Source {
         match spec.facts.unset {
             engine::param::Unset::CurrentFrame => Source::CurrentFrame,
+            engine::param::Unset::CurrentTime => Source::CurrentTime,
             engine::param::Unset::SceneStart => Source::Constant(Value::Int(1)),
             engine::param::Unset::Default => Source::Constant(spec.default.clone()),
         }

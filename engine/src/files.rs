@@ -1,13 +1,14 @@
 //! Files that a graph reads. The engine reads them, so that nodes get the same bytes that were hashed for keys.
 
+use std::any::{Any, TypeId};
 use std::collections::BTreeMap;
 use std::fs;
 use std::io::{self, Read as _};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
 use crate::error::{Error, Result};
-use crate::key::ContentKey;
+use crate::key::{ContentKey, Hasher};
 use crate::memory::{Ceiling, size_text};
 
 /// A file identified by the hash of its contents. Its bytes stay in memory until the store releases them, and are read
@@ -15,6 +16,9 @@ use crate::memory::{Ceiling, size_text};
 #[derive(Clone, Debug)]
 pub struct File {
     path: Arc<PathBuf>,
+    /// Of its contents.
+    content: ContentKey,
+    /// Of its contents and those of all files that it is read with.
     key: ContentKey,
     store: Arc<Files>,
 }
@@ -36,9 +40,47 @@ impl File {
         self.path.extension().and_then(|e| e.to_str()).unwrap_or_default()
     }
 
-    /// The key of its contents.
+    /// The key of its contents, and of those of the files that it is read with.
     pub fn key(&self) -> ContentKey {
         self.key
+    }
+
+    /// The folder that it is in, from which files that it names are opened.
+    pub fn folder(&self) -> FileFolder {
+        let folder = self.path.parent().unwrap_or(Path::new("")).to_owned();
+        FileFolder { folder, store: Arc::downgrade(&self.store) }
+    }
+
+    /// What `make` makes of its bytes, made once and kept as long as the store: the structure of a file from which a part
+    /// is read at each frame.
+    ///
+    /// # Errors
+    /// Those of `make`, which are not kept.
+    pub fn derived<T: Send + Sync + 'static>(&self, make: impl FnOnce(&Self) -> Result<T>) -> Result<Arc<T>> {
+        let place = (self.path.to_path_buf(), TypeId::of::<T>());
+        let kept = self.store.derived.lock().unwrap_or_else(PoisonError::into_inner).get(&place).cloned();
+        let kept = kept.filter(|(content, _)| *content == self.content);
+        if let Some(kept) = kept.and_then(|(_, kept)| kept.downcast::<T>().ok()) {
+            return Ok(kept);
+        }
+        // Two threads may both make it.
+        let made = Arc::new(make(self)?);
+        let mut derived = self.store.derived.lock().unwrap_or_else(PoisonError::into_inner);
+        derived.insert(place, (self.content, made.clone()));
+        Ok(made)
+    }
+
+    /// This file, read with others: its key is that of all of them.
+    pub(crate) fn read_with(mut self, others: &[Self]) -> Self {
+        if !others.is_empty() {
+            let mut hasher = Hasher::default();
+            hasher.key(self.content);
+            for other in others {
+                hasher.key(other.key);
+            }
+            self.key = hasher.finish();
+        }
+        self
     }
 
     /// Its bytes, which are the ones that were hashed.
@@ -47,7 +89,7 @@ impl File {
     /// If they had to be read again and have changed, or can no longer be read.
     pub fn bytes(&self) -> Result<Arc<[u8]>> {
         let (bytes, key) = self.store.load(&self.path)?;
-        if key != self.key {
+        if key != self.content {
             let fact = format!("`{}` changed while the graph was cooked", self.path.display());
             return Err(Error::file(fact).hint("cook again when no other program writes to it"));
         }
@@ -55,7 +97,28 @@ impl File {
     }
 }
 
+/// The folder of a file. It does not keep the store.
+#[derive(Clone, Debug)]
+pub struct FileFolder {
+    folder: PathBuf,
+    store: Weak<Files>,
+}
+
+impl FileFolder {
+    /// The file that a file in this folder calls `name`.
+    ///
+    /// # Errors
+    /// If it cannot be read, or the cook is over.
+    pub fn open(&self, name: &str) -> Result<File> {
+        let store = self.store.upgrade().ok_or_else(|| Error::contract("a file was opened after the cook"))?;
+        store.open(&self.folder.join(name))
+    }
+}
+
 type Loaded = (Arc<[u8]>, ContentKey);
+
+/// What was made of files, by path and type.
+type DerivedFiles = BTreeMap<(PathBuf, TypeId), (ContentKey, Arc<dyn Any + Send + Sync>)>;
 
 /// The files of one cook. Bytes are kept until [`Files::release`]; keys for the lifetime of the store.
 #[derive(Debug)]
@@ -63,6 +126,7 @@ pub struct Files {
     ceiling: Ceiling,
     keys: Mutex<BTreeMap<PathBuf, ContentKey>>,
     bytes: Mutex<BTreeMap<PathBuf, Loaded>>,
+    derived: Mutex<DerivedFiles>,
 }
 
 impl Default for Files {
@@ -74,7 +138,7 @@ impl Default for Files {
 impl Files {
     /// A store that refuses files larger than the ceiling.
     pub fn within(ceiling: Ceiling) -> Self {
-        Self { ceiling, keys: Mutex::default(), bytes: Mutex::default() }
+        Self { ceiling, keys: Mutex::default(), bytes: Mutex::default(), derived: Mutex::default() }
     }
 
     /// The file at `path`.
@@ -87,7 +151,7 @@ impl Files {
             Some(key) => key,
             None => self.load(path)?.1,
         };
-        Ok(File { path: Arc::new(path.to_owned()), key, store: self.clone() })
+        Ok(File { path: Arc::new(path.to_owned()), content: key, key, store: self.clone() })
     }
 
     /// Drops all bytes. They are read again when needed, and must then be unchanged.
@@ -267,6 +331,26 @@ mod tests {
         assert_eq!(&*file.bytes().unwrap(), b"v 0 0 0", "bytes in memory are the ones that were hashed");
         files.release();
         assert!(file.bytes().unwrap_err().fact.ends_with("changed while the graph was cooked"));
+    }
+
+    #[test]
+    fn what_is_made_of_a_file_is_kept_and_its_key_covers_what_it_is_read_with() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, text) in [("a", "1"), ("b", "2"), ("c", "3")] {
+            std::fs::write(folder.path().join(name), text).unwrap();
+        }
+        let files = Arc::new(Files::default());
+        let file = files.open(&folder.path().join("a")).unwrap();
+        let length = |file: &File| file.derived(|file| Ok(file.bytes()?.len())).unwrap();
+        let first = length(&file);
+        files.release();
+        assert!(Arc::ptr_eq(&first, &length(&file)));
+        let [b, c] = ["b", "c"].map(|name| file.folder().open(name).unwrap());
+        let key = |others: &[File]| file.clone().read_with(others).key();
+        assert_eq!(key(&[]), file.key());
+        assert!(key(&[b.clone()]) != key(&[c.clone()]) && key(&[b]) != file.key());
+        assert_eq!(&*file.clone().read_with(&[c]).bytes().unwrap(), b"1");
+        assert!(file.folder().open("none").is_err());
     }
 
     #[test]

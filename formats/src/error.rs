@@ -50,9 +50,9 @@ pub enum FormatError {
         /// The name or extension.
         name: String,
     },
-    /// USD is written, not read.
-    #[error("convect does not read USD yet")]
-    UsdIsOnlyWritten,
+    /// USD is read by prim and time, see [`crate::usd::UsdStage`].
+    #[error("it is USD, whose prims and times this does not select")]
+    UsdIsAStage,
     /// The format keeps all frames in one file, which [`write`](crate::write) does not make.
     #[error("{format} keeps all frames in one file, expected a format with one file per frame")]
     OneFile {
@@ -115,9 +115,7 @@ impl FormatError {
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::Content { hint, .. } => hint.map(str::to_owned),
-            Self::UsdIsOnlyWritten => {
-                Some("convert the file to obj, ply or json, with Blender or Houdini for example".into())
-            }
+            Self::UsdIsAStage => Some("read it by the node Usd_In".into()),
             Self::CannotHold { kind, .. } => Some(format!("formats that can: {}", names(&Format::holding([*kind])))),
             Self::NotFinite { .. } => Some("a NaN or infinity comes from the node that made this attribute".into()),
             Self::TypesDiffer { .. } => {

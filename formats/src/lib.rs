@@ -1,11 +1,12 @@
-//! Geometry files: obj, ply and json in and out, USD out.
+//! Geometry files: obj, ply, json and USD in and out.
 //!
 //! [`read`] converts the bytes of a file to a geometry with all components of the file; [`write()`] writes a geometry
 //! so that it reads back bit for bit, as far as the format can store it (the module of each format says what it drops).
 //! Readers never panic, their memory is a small multiple of the file's size, whatever counts the file declares, and
 //! their time is linear in it.
 //!
-//! Readers do not change coordinates: none of these formats declares its unit or axes.
+//! Readers do not change coordinates, because obj, ply and json declare neither unit nor axes; USD does, and is converted
+//! ([`usd::UsdStage`], which reads it by prim and time).
 
 pub mod atomic;
 mod error;
@@ -26,6 +27,8 @@ pub use error::{FilePosition, FormatError};
 pub use format::Format;
 pub use lost::lost;
 
+pub(crate) type Result<T, E = FormatError> = std::result::Result<T, E>;
+
 /// The frame of a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameStamp {
@@ -38,13 +41,13 @@ pub struct FrameStamp {
 /// The geometry in the bytes of a file, with every component the file has.
 ///
 /// # Errors
-/// If the bytes are not a file of that format, and for USD, which is only written.
+/// If the bytes are not a file of that format, and for USD, which is read by [`usd::UsdStage`].
 pub fn read(format: Format, bytes: &[u8]) -> Result<Geometry, FormatError> {
     match format {
         Format::Obj => obj::read(text::opened(format, bytes)?),
         Format::Ply => ply::read(text::opened(format, bytes)?),
         Format::Json => json::read(text::opened(format, bytes)?),
-        Format::Usdc | Format::Usda => Err(FormatError::UsdIsOnlyWritten),
+        Format::Usdc | Format::Usda => Err(FormatError::UsdIsAStage),
     }
 }
 

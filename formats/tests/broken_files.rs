@@ -113,8 +113,8 @@ fn files_of_other_types_are_recognised() {
     assert_eq!(fault(Format::Obj, b"ply\nformat ascii 1.0\n").0, "this is a ply file, expected obj");
     assert_eq!(fault(Format::Ply, b"{\"frame\": 1}").0, "this is a json file, expected ply");
     let (fact, hint) = fault(Format::Usda, b"#usda 1.0\n");
-    assert_eq!(fact, "convect does not read USD yet");
-    assert_eq!(hint.unwrap(), "convert the file to obj, ply or json, with Blender or Houdini for example");
+    assert_eq!(fact, "it is USD, whose prims and times this does not select");
+    assert_eq!(hint.unwrap(), "read it by the node Usd_In");
 }
 
 #[test]

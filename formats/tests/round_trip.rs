@@ -2,7 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "a missing value fails the test")]
 
-use engine::geometry::{Column, Component, Geometry, Grid, Item, Kind, Owner, Volume, fixed_type};
+use engine::geometry::{Column, Component, Geometry, Grid, Item, Kind, Owner, Volume, WIDTH, fixed_type};
+use formats::usd::{DEFAULT_WIDTH, Flavour, NoAssets, UsdStage, UsdWriter};
 use formats::{Format, FrameStamp, read, write};
 use proptest::collection::vec;
 use proptest::option;
@@ -258,5 +259,48 @@ fn components_that_a_format_cannot_hold_are_refused() {
     let nan: Geometry = Component::points(vec![[f32::NAN, 0.0, 0.0]]).into();
     for format in [Format::Obj, Format::Ply, Format::Json] {
         assert_eq!(fault(format, &nan).to_string(), "`P` of points is not finite in row 0");
+    }
+}
+
+/// USD on disk and back, at each of two frames; curves get widths, as the file has them.
+fn comes_back_from_usd(flavour: Flavour, geometry: &Geometry) -> Result<(), TestCaseError> {
+    let mut geometry = geometry.clone();
+    if let Some(curves) = geometry.part_mut(Kind::Curves)
+        && curves.get(WIDTH).is_none()
+    {
+        let rows = vec![DEFAULT_WIDTH; curves.point_count()];
+        curves.set(WIDTH, rows).unwrap();
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.usd");
+    let mut writer = UsdWriter::create(&path, flavour, "a", 24.0, [0.0; 3]).unwrap();
+    writer.frame(1.0, &geometry).unwrap();
+    writer.frame(2.0, &geometry).unwrap();
+    writer.finish().unwrap();
+    let stage = UsdStage::open(std::fs::read(&path).unwrap().into(), NoAssets);
+    let stage = stage.map_err(|error| TestCaseError::fail(error.to_string()))?;
+    prop_assert!(!stage.moves("").unwrap());
+    for time in [1.0, 1.5, 2.0] {
+        let found = stage.read("/a", time, &|_| true).map_err(|error| TestCaseError::fail(error.to_string()))?;
+        prop_assert_eq!(&found.notes, &Vec::<String>::new());
+        for (found, expected) in found.geometry.parts().zip(geometry.parts()) {
+            for ((_, _, found), (_, name, expected)) in found.columns().zip(expected.columns()) {
+                prop_assert_eq!(found.to_bytes(), expected.to_bytes(), "{}", name);
+            }
+        }
+        prop_assert_eq!(&found.geometry, &geometry);
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn usd_holds_everything_but_volumes(geometry in everything(), is_text in any::<bool>()) {
+        // Without a row, an attribute is its name alone.
+        let keep = |_: Owner, _: &str, column: &Column| !column.is_empty();
+        let flavour = if is_text { Flavour::Usda } else { Flavour::Usdc };
+        comes_back_from_usd(flavour, &trimmed_geometry(&geometry, keep))?;
     }
 }

@@ -15,6 +15,7 @@ mod point_in;
 mod shared;
 mod tet_in;
 mod transform;
+mod usd_in;
 
 use engine::node::Node;
 
@@ -34,4 +35,5 @@ pub static NODES: &[&Node] = &[
     &point_in::NODE,
     &tet_in::NODE,
     &transform::NODE,
+    &usd_in::NODE,
 ];

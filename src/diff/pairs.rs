@@ -7,13 +7,15 @@ use formats::Format;
 use formats::atomic::FileError;
 
 use crate::failure::{Exit, Failure};
-use crate::geometry_file::Numbered;
+use crate::geometry_file::{Numbered, stem_and_frame};
 
 /// Two files to compare; one of them may be missing.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Pair {
     pub(super) a: Option<PathBuf>,
     pub(super) b: Option<PathBuf>,
+    /// The time at which USD files are compared.
+    pub(super) time: Option<f64>,
 }
 
 /// The pairs of `a` and `b`, by name or frame; not empty.
@@ -28,7 +30,7 @@ pub(super) fn pairs(a: &Path, b: &Path) -> Result<Vec<Pair>, Failure> {
         (None, None) => {}
     }
     match (a.is_dir(), b.is_dir()) {
-        (false, false) => return Ok(vec![Pair { a: Some(a.to_owned()), b: Some(b.to_owned()) }]),
+        (false, false) => return Ok(vec![Pair { a: Some(a.to_owned()), b: Some(b.to_owned()), time: None }]),
         (true, false) => return Err(not_a_pair(a, b, "a folder")),
         (false, true) => return Err(not_a_pair(b, a, "a folder")),
         (true, true) => {}
@@ -39,6 +41,60 @@ pub(super) fn pairs(a: &Path, b: &Path) -> Result<Vec<Pair>, Failure> {
         return Err(Failure::new(Exit::CommandLine, line));
     }
     Ok(pairs)
+}
+
+/// A file, folder or sequence on one side, or the times of a USD file.
+pub(super) enum DiffSide<'a> {
+    Files(&'a Path),
+    Usd(&'a Path, &'a [f64]),
+}
+
+/// The pairs where at least one side is a USD file: by time. A USD file that does not move, and a file without a number in
+/// its name, have all times of the other side.
+///
+/// # Errors
+/// If the other side is a folder, or a sequence that cannot be listed.
+pub(super) fn usd_pairs(a: &DiffSide<'_>, b: &DiffSide<'_>) -> Result<Vec<Pair>, Failure> {
+    let [a, b] = [timed_files(a)?, timed_files(b)?];
+    // Ordered like the numbers, which are finite.
+    let key = |time: f64| (time + 0.0).to_bits() ^ (((time.to_bits().cast_signed() >> 63).cast_unsigned()) | 1 << 63);
+    let keyed = |files: &[(Option<f64>, PathBuf)], other: &[(Option<f64>, PathBuf)]| -> Vec<(u64, (f64, PathBuf))> {
+        let times: Vec<f64> = other.iter().filter_map(|(time, _)| *time).collect();
+        let times = if times.is_empty() { vec![1.0] } else { times };
+        let at = |(time, path): &(Option<f64>, PathBuf)| match time {
+            Some(time) => vec![(key(*time), (*time, path.clone()))],
+            None => times.iter().map(|time| (key(*time), (*time, path.clone()))).collect(),
+        };
+        files.iter().flat_map(at).collect()
+    };
+    let mut pairs: BTreeMap<u64, Pair> = BTreeMap::new();
+    for (key, (time, path)) in keyed(&a, &b) {
+        pairs.insert(key, Pair { a: Some(path), b: None, time: Some(time) });
+    }
+    for (key, (time, path)) in keyed(&b, &a) {
+        pairs.entry(key).or_insert(Pair { a: None, b: None, time: Some(time) }).b = Some(path);
+    }
+    Ok(pairs.into_values().collect())
+}
+
+fn timed_files(side: &DiffSide<'_>) -> Result<Vec<(Option<f64>, PathBuf)>, Failure> {
+    match side {
+        DiffSide::Usd(path, []) => Ok(vec![(None, (*path).to_owned())]),
+        DiffSide::Usd(path, times) => Ok(times.iter().map(|time| (Some(*time), (*path).to_owned())).collect()),
+        DiffSide::Files(path) if path.is_dir() => {
+            let line = format!("`{}` is a folder and the other is a USD file; compare with a sequence", path.display());
+            Err(Failure::new(Exit::CommandLine, line))
+        }
+        DiffSide::Files(path) => match Numbered::of(path)? {
+            Some(numbered) => {
+                Ok(numbered.find()?.into_iter().map(|(frame, path)| (Some(frame.number()), path)).collect())
+            }
+            None => {
+                let frame = stem_and_frame(path).1.map(engine::time::Frame::number);
+                Ok(vec![(frame, (*path).to_owned())])
+            }
+        },
+    }
 }
 
 fn not_a_pair(one: &Path, other: &Path, what: &str) -> Failure {
@@ -54,10 +110,10 @@ fn not_a_pair(one: &Path, other: &Path, what: &str) -> Failure {
 fn joined<K: Ord>(a: Vec<(K, PathBuf)>, b: Vec<(K, PathBuf)>) -> Vec<Pair> {
     let mut pairs: BTreeMap<K, Pair> = BTreeMap::new();
     for (key, path) in a {
-        pairs.insert(key, Pair { a: Some(path), b: None });
+        pairs.insert(key, Pair { a: Some(path), b: None, time: None });
     }
     for (key, path) in b {
-        pairs.entry(key).or_insert(Pair { a: None, b: None }).b = Some(path);
+        pairs.entry(key).or_insert(Pair { a: None, b: None, time: None }).b = Some(path);
     }
     pairs.into_values().collect()
 }

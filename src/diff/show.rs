@@ -17,7 +17,12 @@ pub(super) fn json(all: &[Compared], tolerance: Option<f64>) -> String {
         .iter()
         .map(|one| {
             let findings: Vec<Value> = one.findings.iter().map(finding_json).collect();
-            json!({"a": path(&one.pair.a), "b": path(&one.pair.b), "same": !one.differs(), "findings": findings})
+            let mut pair =
+                json!({"a": path(&one.pair.a), "b": path(&one.pair.b), "same": !one.differs(), "findings": findings});
+            if let Some(time) = one.pair.time {
+                pair["frame"] = json!(time);
+            }
+            pair
         })
         .collect();
     let same = !all.iter().any(Compared::differs);
@@ -92,9 +97,14 @@ fn row_name(kind: Kind, owner: Option<Owner>) -> &'static str {
 pub(super) fn text(all: &[Compared], tolerance: Option<f64>) -> String {
     let mut text = String::new();
     for one in all {
-        let named = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string()).unwrap_or_default();
+        let time = one.pair.time.filter(|_| all.len() > 1);
+        let time = time.map(|time| format!(" at frame {time}")).unwrap_or_default();
+        let named =
+            |path: &Option<PathBuf>| path.as_ref().map(|path| format!("{}{time}", path.display())).unwrap_or_default();
         let (a, b) = (named(&one.pair.a), named(&one.pair.b));
         match (&one.pair.a, &one.pair.b) {
+            (Some(_), None) if one.pair.time.is_some() => _ = writeln!(text, "{a}: no such frame in the other"),
+            (None, _) if one.pair.time.is_some() => _ = writeln!(text, "{b}: no such frame in the other"),
             (Some(_), None) => _ = writeln!(text, "{a}: no file to compare it with"),
             (None, _) => _ = writeln!(text, "{b}: no file to compare it with"),
             _ if all.len() > 1 && one.differs() => _ = writeln!(text, "{a} and {b}:"),

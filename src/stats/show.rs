@@ -11,7 +11,11 @@ use crate::numbers::{decimal, short};
 
 /// JSON: one object for each component, with the tables of the json format.
 pub(super) fn json(name: &str, file: &GeometryFile, stats: &Stats) -> String {
-    let mut all = json!({"file": name, "format": file.format.name(), "bytes": file.bytes});
+    let mut all = json!({"file": name, "format": file.format, "bytes": file.bytes});
+    if let Some((time, times)) = file.time {
+        all["frame"] = json!(time);
+        all["frames"] = json!(times);
+    }
     for part in &stats.parts {
         all[part.kind.name()] = part_json(part);
     }
@@ -115,6 +119,9 @@ fn as_stored(attribute: &AttributeStats, number: f64) -> f64 {
 /// Text, one block for each component.
 pub(super) fn text(name: &str, file: &GeometryFile, stats: &Stats) -> String {
     let mut text = format!("{name}: {}, {} bytes\n", file.format, file.bytes);
+    if let Some((time, times)) = file.time {
+        line(&mut text, "frame", &format!("{time}, of {times} with samples"));
+    }
     for part in &stats.parts {
         part_text(part, &mut text);
     }

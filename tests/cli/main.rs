@@ -22,3 +22,4 @@ mod stopped;
 mod study;
 mod study_extremes;
 mod targets;
+mod usd;

@@ -95,19 +95,3 @@ fn an_obstacle_to_writing_a_file_is_reported() {
     );
     assert_eq!(stderr(graph, &["stats", "shot.usdc"]), "`shot.usdc` could not be read: no such file or folder\n");
 }
-
-#[test]
-fn reading_usd_is_refused_with_a_reason() {
-    let bench = Bench::new();
-    bench.done(&["cook", "g.json"]);
-    let expected = "`out/grass.usdc`: convect does not read USD yet; \
-                    convert the file to obj, ply or json, with Blender or Houdini for example\n";
-    for (args, code) in [
-        (&["stats", "out/grass.usdc"][..], 1),
-        (&["convert", "out/grass.usdc", "grass.json"], 1),
-        (&["diff", "out/grass.usdc", "out/grass.usdc"], 2),
-    ] {
-        let ran = bench.run(args);
-        assert_eq!((ran.code, ran.stderr.as_str()), (Some(code), expected), "{args:?}");
-    }
-}

@@ -20,7 +20,7 @@ const PAIRS: usize = 60;
 fn check_param(subject: &Subject, tried: &[(Trial, Outcome)], index: usize, findings: &mut Findings) {
     let spec = &subject.specs[index];
     // The engine uses it to choose the file of a sequence.
-    if spec.facts.unset == Unset::CurrentFrame {
+    if matches!(spec.facts.unset, Unset::CurrentFrame | Unset::CurrentTime) {
         return;
     }
     if !tried.iter().any(|(_, outcome)| outcome.read.get(index) == Some(&true)) {

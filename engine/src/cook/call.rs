@@ -113,7 +113,9 @@ impl Finished<'_> {
         for declared in node.outputs {
             let found = outputs.0.iter().find(|(name, _)| *name == declared.name);
             let (_, geometry) = found.ok_or_else(|| Error::contract(format!("it returns no `{}`", declared.name)))?;
-            if let Carries::Kinds(kinds) = declared.carries {
+            if let Carries::Kinds(kinds) = declared.carries
+                && !declared.may_lack
+            {
                 check_kinds(declared.name, kinds, geometry)?;
             }
             check_finite(geometry, &known).map_err(|error| error.hint(NOT_FINITE))?;
@@ -144,7 +146,8 @@ fn check_wires(input: &str, kind: Kind, data: &InputData) -> Result<()> {
     for wire in wires {
         let there = if kind == Kind::Volume { wire.volume().is_some() } else { wire.part(kind).is_some() };
         if !there {
-            return Err(Error::refused(format!("the geometry of the input `{input}` has no {kind}")));
+            let error = Error::refused(format!("the geometry of the input `{input}` has no {kind}"));
+            return Err(error.hint("`convect stats FILE` prints what a file has"));
         }
     }
     Ok(())

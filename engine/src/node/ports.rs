@@ -248,22 +248,30 @@ pub struct Output {
     pub help: &'static str,
     /// The components that it carries.
     pub carries: Carries,
+    /// Whether it may lack them, as a file may.
+    pub may_lack: bool,
 }
 
 impl Output {
     /// An output that carries `kinds`.
     pub const fn new(name: &'static str, kinds: &'static [Kind], help: &'static str) -> Self {
-        Self { name, help, carries: Carries::Kinds(kinds) }
+        Self { name, help, carries: Carries::Kinds(kinds), may_lack: false }
     }
 
     /// An output with the components of `input`.
     pub const fn like<A>(name: &'static str, input: &Input<A>, help: &'static str) -> Self {
-        Self { name, help, carries: Carries::Like(input.name()) }
+        Self { name, help, carries: Carries::Like(input.name()), may_lack: false }
     }
 
     /// An output with the components of all wires of `input`.
     pub const fn union(name: &'static str, input: &Input<Many>, help: &'static str) -> Self {
-        Self { name, help, carries: Carries::Union(input.name()) }
+        Self { name, help, carries: Carries::Union(input.name()), may_lack: false }
+    }
+
+    /// An output that may lack its components; an input that needs them then refuses the wire when it is cooked.
+    pub const fn may_lack(mut self) -> Self {
+        self.may_lack = true;
+        self
     }
 
     /// This output with its geometry: what a node returns.

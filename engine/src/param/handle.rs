@@ -126,6 +126,25 @@ impl<T: ParamType> Param<T> {
         self
     }
 
+    /// If the graph does not set it, the value is the current frame, with its fraction.
+    pub const fn default_current_time(mut self) -> Self {
+        self.facts.unset = Unset::CurrentTime;
+        self
+    }
+
+    /// Selects a time of a file: read only where `timed` says that the file has several, or the file is one of a numbered
+    /// sequence. `timed` gets all params with their files.
+    pub const fn of_timed_file(mut self, timed: fn(&Params) -> bool) -> Self {
+        self.facts.timed = Some(timed);
+        self
+    }
+
+    /// The param is a file that is read with others, which depend on the value of the node's param `frame`.
+    pub const fn read_with(mut self, companions: fn(&File, f64) -> crate::Result<Vec<File>>) -> Self {
+        self.facts.companions = Some(companions);
+        self
+    }
+
     /// If the graph does not set it, the value is the scene's first frame.
     pub const fn default_scene_start(mut self) -> Self {
         self.facts.unset = Unset::SceneStart;

@@ -48,6 +48,8 @@ pub enum Source {
     Code(CodeSource),
     /// The current frame, rounded down.
     CurrentFrame,
+    /// The current frame with its fraction.
+    CurrentTime,
     /// A file, opened when the params are resolved. If `numbered`, runs of `#` in its path are replaced by the frame
     /// number.
     File {
@@ -71,7 +73,7 @@ impl Source {
                 uses.time || uses.controls.iter().any(|control| controls.is_animated(*control))
             }),
             Self::Code(code) => code.is_animated(),
-            Self::CurrentFrame => true,
+            Self::CurrentFrame | Self::CurrentTime => true,
             // A numbered path depends on the node's param `frame`, which is checked on its own.
             Self::File { .. } => false,
             Self::Masked(value, _) => value.is_animated(),
@@ -116,6 +118,7 @@ impl Source {
             }
             Self::Code(code) => Value::Code(code.at(frame, clock)),
             Self::CurrentFrame => Value::Int(frame.floor() as i64),
+            Self::CurrentTime => Value::Float(frame),
             Self::File { .. } => Value::File(None),
             Self::Masked(value, attribute) => Value::Masked(value.at(frame, clock).number(), Some(attribute.clone())),
         }

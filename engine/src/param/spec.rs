@@ -4,6 +4,7 @@ use super::Params;
 use super::choice::ChoiceOption;
 use super::unit::Unit;
 use super::value::Value;
+use crate::files::File;
 
 /// The JSON form of a param.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,6 +144,10 @@ pub struct Facts {
     pub when: Option<fn(&Params) -> bool>,
     /// Its value if the graph does not set it.
     pub unset: Unset,
+    /// Of a param that selects a time of a file: whether the file has several, given all params with their files.
+    pub timed: Option<fn(&Params) -> bool>,
+    /// Of a file: the other files that it is read with at a frame.
+    pub companions: Option<fn(&File, f64) -> crate::Result<Vec<File>>>,
 }
 
 /// The value of a param that the graph does not set.
@@ -152,6 +157,8 @@ pub enum Unset {
     Default,
     /// The current frame, rounded down.
     CurrentFrame,
+    /// The current frame with its fraction.
+    CurrentTime,
     /// The scene's first frame.
     SceneStart,
 }
@@ -166,6 +173,8 @@ impl Facts {
         direction: false,
         when: None,
         unset: Unset::Default,
+        timed: None,
+        companions: None,
     };
 }
 
@@ -244,7 +253,7 @@ impl ParamSpec {
     /// The default as help shows it.
     pub fn default_text(&self) -> String {
         match self.facts.unset {
-            Unset::CurrentFrame => return "the current frame".into(),
+            Unset::CurrentFrame | Unset::CurrentTime => return "the current frame".into(),
             Unset::SceneStart => return "the scene's first frame".into(),
             Unset::Default => {}
         }

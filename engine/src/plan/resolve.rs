@@ -60,11 +60,14 @@ impl<'g> Resolver<'g> {
     }
 
     /// Whether the node reads the param, given the others. A param whose default is the current frame selects a file of
-    /// a sequence, so it is not read without a sequence.
+    /// a sequence, or a
+    /// time of a file, so it is not read without either.
     fn is_read(&self, index: usize, params: &Params) -> bool {
         let facts = &self.specs[index].facts;
         let sequence = || self.sources.iter().any(|source| matches!(source, Source::File { numbered: true, .. }));
-        facts.when.is_none_or(|when| when(params)) && (facts.unset != Unset::CurrentFrame || sequence())
+        let selects = matches!(facts.unset, Unset::CurrentFrame | Unset::CurrentTime);
+        let timed = || facts.timed.is_some_and(|timed| timed(params));
+        facts.when.is_none_or(|when| when(params)) && (!selects || sequence() || timed())
     }
 
     /// Whether any param that is read changes with time.
@@ -111,7 +114,10 @@ impl<'g> Resolver<'g> {
     }
 
     fn evaluate(&self, frame: f64, past: bool) -> Result<Params> {
-        self.with_files(self.values(frame, past)?)
+        let params = self.with_files(self.values(frame, past)?)?;
+        // Whether a file has several times is known when it is open.
+        let is_timed = self.specs.iter().any(|spec| spec.facts.timed.is_some());
+        Ok(if is_timed { self.without_unread(params, past) } else { params })
     }
 
     fn values(&self, frame: f64, past: bool) -> Result<Params> {
@@ -154,6 +160,13 @@ impl<'g> Resolver<'g> {
                 false => self.files.open(path)?,
                 true => self.files.open(&numbered_path(path, self.file_frame(&params)))?,
             };
+            let file = match self.specs[index].facts.companions {
+                Some(companions) => {
+                    let others = companions(&file, self.file_time(&params))?;
+                    file.read_with(&others)
+                }
+                None => file,
+            };
             values.get_or_insert_with(|| params.values.to_vec())[index] = Value::File(Some(file));
         }
         if let Some(values) = values {
@@ -164,10 +177,12 @@ impl<'g> Resolver<'g> {
 
     /// The frame number that replaces `####`: the node's param `frame`.
     fn file_frame(&self, params: &Params) -> i64 {
+        self.file_time(params).floor() as i64
+    }
+
+    /// The time at which a file is read: the same, with its fraction.
+    fn file_time(&self, params: &Params) -> f64 {
         let index = self.specs.iter().position(|spec| spec.name == "frame");
-        match index.map(|index| &params.values[index]) {
-            Some(Value::Int(frame)) => *frame,
-            _ => 0,
-        }
+        index.map_or(0.0, |index| params.values[index].number())
     }
 }

@@ -1,4 +1,4 @@
-//! USD files, `.usda` (text) and `.usdc` (crate 0.8.0), written without Pixar's library.
+//! USD files without Pixar's library: `.usda` (text) and `.usdc` (crate 0.8.0) written, and read by [`UsdStage`].
 //!
 //! A [`UsdWriter`] is given one geometry per frame and keeps only the last one in memory, plus 8 bytes per attribute
 //! and frame. An array that equals the previous one of its attribute, by address or bit for bit, is stored once; what
@@ -25,6 +25,7 @@ mod coding;
 mod extent;
 mod layout;
 mod names;
+mod read;
 mod recorder;
 mod stage;
 mod structure;
@@ -42,6 +43,7 @@ use recorder::{Header, Recorder};
 use stage::Encoder;
 
 pub use layout::DEFAULT_WIDTH;
+pub use read::{NoAssets, UsdAssets, UsdReading, UsdStage};
 
 /// The two file formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -144,7 +144,7 @@ fn metadata(depth: usize, lines: Vec<String>) -> String {
 }
 
 /// A string literal on one line.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     let mut quoted = String::from("\"");
     for c in text.chars() {
         match c {
@@ -209,7 +209,7 @@ fn put_float(text: &mut Vec<u8>, x: f32) {
     text.extend_from_slice(usd_spelling(zmij::Buffer::new().format(x)).as_bytes());
 }
 
-fn decimal(x: f64) -> String {
+pub(super) fn decimal(x: f64) -> String {
     usd_spelling(zmij::Buffer::new().format(x)).to_owned()
 }
 

@@ -5,3 +5,4 @@ pub(crate) mod kept;
 pub(crate) mod planting;
 pub(crate) mod skin;
 pub(crate) mod source;
+pub(crate) mod usd;

@@ -77,6 +77,7 @@ impl<'a> Reader<'a, '_> {
     fn unset(&self, spec: &ParamSpec) -> Source {
         match (spec.facts.unset, spec.shape) {
             (Unset::CurrentFrame, _) => Source::CurrentFrame,
+            (Unset::CurrentTime, _) => Source::CurrentTime,
             (Unset::SceneStart, Shape::Float) => Source::Constant(Value::Float(self.scene.first as f64)),
             (Unset::SceneStart, _) => Source::Constant(Value::Int(self.scene.first)),
             (Unset::Default, _) => Source::Constant(self.finished(spec.shape, spec.default.clone())),
