@@ -19,9 +19,9 @@
 mod follow;
 mod phases;
 mod pieces;
-mod thick;
 #[cfg(test)]
 mod tests;
+mod thick;
 
 use std::mem::take;
 
@@ -435,7 +435,8 @@ impl VolumeTargets {
             if error.abs() <= LEAST_ERROR * target || piece.area.all <= 0.0 {
                 return (vec![0.0; count], 1.0);
             }
-            let least = piece.area.least(error.abs() / (responses[n] * cap));
+            // Half of what may move now: more is there for what comes back less than its area says.
+            let least = piece.area.least(2.0 * error.abs() / (responses[n] * cap));
             let per_way = |area: Area| responses[n] * area.moved(least);
             if count == 1 {
                 return (vec![(error / per_way(piece.area)).clamp(-cap, cap)], least);
