@@ -273,39 +273,40 @@ impl CollisionScene<'_> {
         scene.find(&ContactQuery { from: x, to: x, times: [1.0; 2] }, &mut contacts);
         let depths = contacts.iter().map(|contact| contact.depth(x));
         let mut found = Penetration { inside: 0, deepest: depths.fold(0.0, f64::max) };
-        let points: Vec<Vec<[f64; 3]>> = (0..self.skins.len())
-            .map(|skin| {
-                let own = self.skins[skin].touching.iter().map(|particle| x[*particle as usize]);
-                own.chain(more.get(skin).into_iter().flatten().copied()).collect()
-            })
-            .collect();
-        let boxes: Vec<_> = points.iter().map(|points| bounds(points.iter().copied())).collect();
+        // The points of each skin: its particles, then more.
+        let (mut points, mut is_particle, mut ranges) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, skin) in self.skins.iter().enumerate() {
+            let first = points.len();
+            points.extend(skin.touching.iter().map(|particle| x[*particle as usize]));
+            is_particle.resize(points.len(), true);
+            points.extend(more.get(index).into_iter().flatten());
+            is_particle.resize(points.len(), false);
+            ranges.push((first..points.len(), bounds(points[first..].iter().copied())));
+        }
         if let Some(ground) = self.ground {
-            let heights = points.iter().flatten().map(|p| DVec3::from(*p).dot(&DVec3::from(ground.up)) - ground.height);
+            let heights = points.iter().map(|p| DVec3::from(*p).dot(&DVec3::from(ground.up)) - ground.height);
             found.deepest = heights.fold(found.deepest, |deepest, height| deepest.max(ground.thickness - height));
         }
-        let mut inside: Vec<Vec<bool>> = points.iter().map(|points| vec![false; points.len()]).collect();
-        for obstacle in self.obstacles {
-            let at = obstacle.at(1.0);
-            let solid = SolidShape { surface: &obstacle.surface, at: &at, gap: obstacle.thickness };
-            let around = bounds(at.iter().copied());
-            for (skin, points) in points.iter().enumerate().filter(|(skin, _)| overlap(&boxes[*skin], &around)) {
-                let particles = self.skins[skin].touching.len();
-                solid.depths(points, particles, &mut inside[skin], &mut found.deepest);
-            }
+        let ends: Vec<_> = self.obstacles.iter().map(|obstacle| obstacle.at(1.0)).collect();
+        let obstacles = self
+            .obstacles
+            .iter()
+            .zip(&ends)
+            .map(|(obstacle, at)| (None, SolidShape { surface: &obstacle.surface, at, gap: obstacle.thickness }));
+        let skins = self.skins.iter().enumerate().filter_map(|(index, skin)| {
+            Some((Some(index), SolidShape { surface: &skin.surface, at: x, gap: self.body_contact?.thickness }))
+        });
+        let mut inside = vec![false; points.len()];
+        for (own, solid) in obstacles.chain(skins) {
+            let around = bounds(solid.surface.vertices.iter().map(|vertex| solid.at[*vertex as usize]));
+            let others = ranges.iter().enumerate().filter(|(skin, _)| Some(*skin) != own);
+            let near = others.filter(|(_, (_, own))| overlap(own, &around)).flat_map(|(_, (range, _))| range.clone());
+            // What contacts do not measure, and what may be inside.
+            let near = near.filter(|point| !is_particle[*point] || overlap(&[points[*point]; 2], &around));
+            let near: Vec<u32> = near.map(|point| point as u32).collect();
+            solid.depths(&points, &near, &is_particle, &mut inside, &mut found.deepest);
         }
-        if let Some(contact) = self.body_contact {
-            for (index, skin) in self.skins.iter().enumerate() {
-                let solid = SolidShape { surface: &skin.surface, at: x, gap: contact.thickness };
-                let around = skin_bounds(skin, x);
-                let others = points.iter().enumerate();
-                for (other, points) in others.filter(|(other, _)| *other != index && overlap(&boxes[*other], &around)) {
-                    let particles = self.skins[other].touching.len();
-                    solid.depths(points, particles, &mut inside[other], &mut found.deepest);
-                }
-            }
-        }
-        found.inside = inside.iter().flatten().filter(|inside| **inside).count();
+        found.inside = inside.iter().filter(|inside| **inside).count();
         found
     }
 }
@@ -318,20 +319,15 @@ struct SolidShape<'a> {
 }
 
 impl SolidShape<'_> {
-    /// Marks the points that are `inside`, and raises `deepest` to the largest depth of a point below the gap. Of the
-    /// first `particles` of them, those outside are left to contacts, which know how near they are.
-    fn depths(&self, points: &[[f64; 3]], particles: usize, inside: &mut [bool], deepest: &mut f64) {
+    /// Marks those of the `near` points that are `inside`, and raises `deepest` to the largest depth of one below the gap.
+    /// Particles outside are left to contacts, which know how near they are.
+    fn depths(&self, points: &[[f64; 3]], near: &[u32], is_particle: &[bool], inside: &mut [bool], deepest: &mut f64) {
         let mut within = vec![false; points.len()];
-        if self.surface.closed {
-            let [low, high] = bounds(self.surface.vertices.iter().map(|vertex| self.at[*vertex as usize]));
-            let is_near = |p: &[f64; 3]| (0..3).all(|axis| low[axis] <= p[axis] && p[axis] <= high[axis]);
-            let near: Vec<u32> = (0..).zip(points).filter(|(_, p)| is_near(p)).map(|(point, _)| point).collect();
-            if !near.is_empty() {
-                Enclosure::new(self.at, &self.surface.triangles, 0.0).mark(points, &near, &mut within);
-            }
+        if self.surface.closed && !near.is_empty() {
+            Enclosure::new(self.at, &self.surface.triangles, 0.0).mark(points, near, &mut within);
         }
-        let measured = |point: &u32| within[*point as usize] || *point as usize >= particles;
-        let measured: Vec<u32> = (0..points.len() as u32).filter(measured).collect();
+        let measured = |point: &&u32| within[**point as usize] || !is_particle[**point as usize];
+        let measured: Vec<u32> = near.iter().filter(measured).copied().collect();
         if measured.is_empty() {
             return;
         }
