@@ -6,6 +6,8 @@
 
 mod colliders;
 mod empty;
+mod groups;
+mod guided;
 mod numbers;
 mod wind;
 
@@ -27,14 +29,16 @@ use crate::cooked::{fault, graph, metrics};
 type Point = [f32; 3];
 type At = Arc<dyn Fn(Frame) -> Geometry + Send + Sync>;
 
-/// The nodes that are checked: the chain, and the nodes that attach and interpolate curves.
-const NODES: [&str; 7] = ["gusts", "lee", "wind", "swing", "out", "grown", "hairs"];
+/// The nodes that are checked: the chain, and the nodes that attach, interpolate, deform and resample curves.
+const NODES: [&str; 9] = ["gusts", "lee", "wind", "swing", "out", "grown", "hairs", "guided", "fine"];
 
 /// The inputs of all nodes in a row.
 #[derive(Clone)]
 struct Scene {
     fur: At,
     skin: At,
+    /// Guides at rest, if they are not the fur itself.
+    posts: Option<At>,
     /// Params by node.
     params: BTreeMap<&'static str, String>,
     fps: f64,
@@ -52,10 +56,13 @@ impl Scene {
             ("lee", ""),
             ("swing", ""),
             ("out", ""),
+            ("guided", ""),
+            ("fine", ""),
         ];
         Self {
             fur: Arc::new(|_| curves(&hairs(20, 5, 0.3))),
             skin: Arc::new(|_| ball()),
+            posts: None,
             params: params.map(|(node, params)| (node, params.to_owned())).into(),
             fps: 24.0,
             refused: &[],
@@ -70,6 +77,10 @@ impl Scene {
         Self { skin: Arc::new(at), ..self }
     }
 
+    fn posts(self, at: impl Fn(Frame) -> Geometry + Send + Sync + 'static) -> Self {
+        Self { posts: Some(Arc::new(at)), ..self }
+    }
+
     /// Replaces the params of a node.
     fn with(mut self, node: &'static str, params: impl Into<String>) -> Self {
         self.params.insert(node, params.into());
@@ -82,6 +93,7 @@ impl Scene {
 
     fn nodes(&self) -> String {
         let params = |node: &str| self.params.get(node).map_or("", String::as_str);
+        let posts = if self.posts.is_some() { "posts" } else { "fur" };
         format!(
             r#"
             "fur": {{ "type": "Curve_In", "params": {{ "points": [[0, 0, 0], [0, 1, 0]] }} }},
@@ -94,13 +106,20 @@ impl Scene {
             "out": {{ "type": "Curve_Wind_Collision",
                      "inputs": {{ "curves": "swing", "rest": "fur", "colliders": ["skin"] }}, "params": {{ {} }} }},
             "grown": {{ "type": "Curve_Attach", "inputs": {{ "curves": "fur", "rest_skin": "still", "skin": "skin" }} }},
-            "hairs": {{ "type": "Curve_Interpolate", "inputs": {{ "guides": "fur", "skin": "skin" }}, "params": {{ {} }} }}"#,
+            "hairs": {{ "type": "Curve_Interpolate", "inputs": {{ "guides": "fur", "skin": "skin" }}, "params": {{ {} }} }},
+            "posts": {{ "type": "Curve_In", "params": {{ "points": [[0, 0, 0], [0, 1, 0]] }} }},
+            "blown": {{ "type": "Curve_Wind", "inputs": {{ "curves": "{posts}" }} }},
+            "guided": {{ "type": "Curve_Deform", "params": {{ {} }}, "inputs": {{
+                "curves": "fur", "rest_guides": "{posts}", "guides": "blown", "rest_skin": "still", "skin": "skin" }} }},
+            "fine": {{ "type": "Curve_Resample", "inputs": {{ "curves": "wind" }}, "params": {{ {} }} }}"#,
             params("gusts"),
             params("lee"),
             params("wind"),
             params("swing"),
             params("out"),
             params("hairs"),
+            params("guided"),
+            params("fine"),
         )
     }
 
@@ -121,7 +140,8 @@ impl Scene {
         let first = (self.skin)(Frame::whole(1));
         let given: [(&str, At); 3] =
             [("fur", self.fur.clone()), ("skin", self.skin.clone()), ("still", Arc::new(move |_| first.clone()))];
-        for (id, at) in given {
+        let posts = self.posts.clone().map(|at| ("posts", at));
+        for (id, at) in given.into_iter().chain(posts) {
             let node = graph.nodes.iter_mut().find(|node| &*node.id == id).unwrap();
             node.body = Body::Given { at, moves: true };
         }
@@ -201,7 +221,7 @@ fn check(what: &str, cooked: &Cooked, frame: usize, fur: Geometry, skin: Geometr
         if let Some(envelope) = made.get(ENVELOPE).filter(|_| fur.get(ENVELOPE).is_none()) {
             assert!(envelope.iter().all(|x| (0.0..=1.0).contains(x)), "{what}: `{node}`");
         }
-        if node != "hairs" {
+        if !["hairs", "fine"].contains(&node) {
             assert_eq!(made.runs(), fur.runs(), "{what}: `{node}`");
             let error = length_error(made, fur);
             assert!(error <= 1e-5, "{what}: `{node}` changes lengths by {error:.1e} of a curve's");
