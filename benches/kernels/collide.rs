@@ -60,7 +60,7 @@ fn main() {
                 gap: 1e-4,
                 offset_root: 1e-4,
                 offset_scale: None,
-                loft: 0.0,
+                loft: 0.0.into(),
                 coherence: 0.0,
                 at_rest: None,
                 blend: 1.0.into(),

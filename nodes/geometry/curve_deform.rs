@@ -6,8 +6,8 @@
 //! a skin, roots stay on their faces and curves turn with it as in Curve_Attach; roots that are lifted off the skin, as
 //! Curve_Wind_Collision lifts those of guides, lift those of the curves.
 //!
-//! With `keep_out` a curve that would enter the skin turns from its rest shape until it meets the skin, as in
-//! Curve_Wind_Collision ([`curves::collide::keep_out`]). Those that stay above everything around their roots need no test.
+//! With `keep_out` a curve that would enter the skin is blended with its rest shape by the least share that frees it
+//! ([`curves::collide::keep_out`]). Those that stay above everything around their roots need no test.
 //!
 //! `v`, `N` and `orient` turn too, those of a CV with the segment after it, those of a curve with its root. If the curves
 //! have no `Pref`, it is set to their incoming positions.
@@ -74,9 +74,9 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Deform",
-    1,
-    "Lets an existing groom follow guide curves, so that only a few hundred guides need to be simulated. Each curve turns as the guides nearest to its root have turned since rest, and keeps its own \
-     shape, length and attributes. On a skin, curves are kept out of it.",
+    2,
+    "Lets an existing groom follow guide curves, so that only a few hundred guides need to be simulated. Each curve turns \
+     as the guides nearest to its root have turned since rest, and keeps its own shape, length and attributes. On a skin, curves are kept out of it.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)

@@ -88,7 +88,7 @@ params! { PARAMS:
     LOOP: Param<f64> = Param::double("loop", 0.0,
         "Number of frames after which the noise comes again, for a cycle that can be repeated; keyed params must repeat \
          too. The pattern fades over into itself, so it should move by a feature or more in this time. 0 does not loop.")
-        .unit(Unit::Frames).at_least(0.0).soft(0.0, 240.0).when(|params| has_noise(params) && params.get(SCROLL) != 0.0);
+        .unit(Unit::Frames).within(0.0, 1e9).soft(0.0, 240.0).when(|params| has_noise(params) && params.get(SCROLL) != 0.0);
     NOISE_SPACE: Param<Space> = Param::choice("noise_space", Space::World,
         "Whether the noise pattern stays in the world or sticks to the animal.").when(has_noise);
     WAVINESS: Param<Maskable> = Param::maskable("waviness", 0.0,

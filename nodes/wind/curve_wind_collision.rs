@@ -13,7 +13,9 @@
 //!   skin by a continuous map, and lets them take a free direction however they get there: on the bear, in wind that moves
 //!   0.50 % of all curves by more than a quarter of their length in a frame, collision raises that to 1.07 %, and to
 //!   0.63 % at `coherence` 1 (tests/wind/coherence.rs); docs/wind.md has other bodies.
-//! * `loft`, by default, keeps a tenth of the height of what the wind presses down: first contact lays it on the skin.
+//! * `loft` keeps a share of the height of what the wind presses down, which first contact lays on the skin. It is 0 by
+//!   default: by the tangent plane of the root alone it makes fur stand off where the wind blows against a curved skin, and
+//!   twice to five times as many tips jump (docs/wind.md).
 //! * A segment may be carried to where no turn about its CV frees it, which W leaves open. Then the whole curve is blended
 //!   towards rest, up to its first pose that crosses nothing.
 //! * `offset_scale` only raises segments that would lie lower: wind may lift fur off the skin.
@@ -56,15 +58,15 @@ params! { PARAMS:
          a move of 4 times this distance reaches that. If this is less than `gap`, the \
          beginning of a curve is not tested, because it touches the skin.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
-    OFFSET_SCALE: Param<f64> = Param::double("offset_scale", -1.0,
+    OFFSET_SCALE: Param<Maskable> = Param::maskable("offset_scale", -1.0,
         "Minimum height above the skin, relative to the height at rest: 1 keeps the volume of the coat, smaller values \
          let the wind press it down. Negative values turn this off.")
         .soft(-1.0, 1.0);
-    LOFT: Param<f64> = Param::double("loft", 0.1,
+    LOFT: Param<Maskable> = Param::maskable("loft", 0.0,
         "Share of its height at rest, above the tangent plane of the skin at its root, that a CV keeps which the wind blows \
-         below it: a little keeps a coat from lying glued to the skin, and saves time. `coherence` scales it by \
-         1 − its own value. 0 is the paper's.")
-        .within(0.0, 1.0).when(|params| params.get(OFFSET_SCALE) < 0.0 && params.get(COHERENCE) < 1.0);
+         below it: a little keeps a coat from lying on the skin. Where the wind blows against the skin such fur stands off \
+         it, and jumps more often as the wind turns. `coherence` scales it by 1 − its own value. 0 is the paper's.")
+        .within(0.0, 1.0).when(|params| params.get(OFFSET_SCALE).value < 0.0 && params.get(COHERENCE) < 1.0);
     GAP: Param<f64> = Param::double("gap", 1e-4,
         "Distance, along the arc of its turn, at which a segment stops before a contact.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
@@ -134,7 +136,7 @@ const MANY: f64 = 20.0;
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Collision",
-    5,
+    6,
     "Keeps curves that are bent by wind out of colliders. Each segment, root to tip, turns from its rest direction \
      towards the direction that the wind gave it, until it touches a collider. Place this node after the wind, and \
      wire the curves from before the wind into `rest`. Of each curve, `unfreed` is the number of segments that still \
@@ -171,10 +173,10 @@ pub(crate) static NODE: Node = Node::new(
     if params.get(COHERENCE) == 0.0 {
         left_out.push(LeftOut::new("redirection", "`coherence` is 0"));
     }
-    if params.get(OFFSET_SCALE) < 0.0 {
+    if params.get(OFFSET_SCALE).value < 0.0 {
         left_out.push(LeftOut::new("offset", "`offset_scale` is below 0"));
     }
-    if params.get(LOFT) == 0.0 {
+    if params.get(LOFT).value == 0.0 {
         left_out.push(LeftOut::new("loft", "`loft` is 0"));
     }
     left_out
@@ -249,8 +251,8 @@ fn collided(cx: &Cx, curves: &Component, rest: &Component) -> Result<Found> {
         coherence: cx.get(COHERENCE),
         gap: cx.get(GAP),
         offset_root: cx.get(OFFSET_ROOT),
-        offset_scale: Some(cx.get(OFFSET_SCALE)).filter(|scale| *scale >= 0.0),
-        loft: cx.get(LOFT),
+        offset_scale: Some(cx.mask(OFFSET_SCALE, curves)?.map(f64::from)).filter(|scale| scale.value >= 0.0),
+        loft: cx.mask(LOFT, curves)?.map(f64::from),
         at_rest: None,
         blend: group::masked(blend, factors.as_deref()),
         width: cx.mask(WIDTH, curves)?,
@@ -258,7 +260,7 @@ fn collided(cx: &Cx, curves: &Component, rest: &Component) -> Result<Found> {
     let starts = curves.runs().starts();
     // Computed once for still colliders and curves.
     let tree = skin.as_ref().map(|skin| skin.tree().clone());
-    let still = Still { obstacles: trees.clone(), skin: tree, offset: how.offset_root, lofts: how.loft > 0.0 };
+    let still = Still { obstacles: trees.clone(), skin: tree, offset: how.offset_root, lofts: how.loft.value > 0.0 };
     let at_rest = rest.kept(still, || Ok(at_rest(starts, rest.positions(), &how)))?;
     how.at_rest = Some(&at_rest);
     let collided = collide(starts, rest.positions(), curves.positions(), &how);

@@ -76,7 +76,7 @@ params! { PARAMS:
     LOOP: Param<f64> = Param::double("loop", 0.0,
         "Number of frames after which the same gusts come again, for a cycle that can be repeated; keyed params must \
          repeat too. `repeat_every` is then adjusted so that it divides the loop. 0 does not loop.")
-        .unit(Unit::Frames).at_least(0.0).soft(0.0, 240.0).when(is_asked);
+        .unit(Unit::Frames).within(0.0, 1e9).soft(0.0, 240.0).when(is_asked);
     FALLOFF: Param<Arc<Ramp>> = Param::smooth_ramp("falloff", &[[0.0, 1.0], [1.0, 0.0]],
         "Strength of the wind within a gust, from its centre (0) to its boundary (1): 1 is the full wind.")
         .when(is_asked);
@@ -122,7 +122,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Gusts",
-    2,
+    3,
     "Sends gusts over the curves: writes their `envelope`, by which Curve_Wind scales the wind, so that it blows where \
      a gust passes. Gusts are spheres that travel with the wind, each with its own random size, speed and start, or \
      regions placed by hand with Gust_Control.",
@@ -201,7 +201,9 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
         let shear = cx.mask(SHEAR, cx.part(CURVES))?;
         let mut add = |cv: usize, side: [f32; 3]| {
             for axis in 0..3 {
-                all[cv][axis] += shear.at(cv) * side[axis];
+                // Infinity times 0 is NaN and counts as 0.
+                let sum = all[cv][axis] + shear.at(cv) * side[axis];
+                all[cv][axis] = if sum.is_nan() { 0.0 } else { sum.clamp(-LARGEST, LARGEST) };
             }
         };
         match &group {
@@ -212,6 +214,9 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
     }
     Ok(OUT.with(curves))
 }
+
+/// Largest part of `gust_dir` along an axis: the wind itself, of length 1, is then below rounding.
+const LARGEST: f32 = 1e12;
 
 /// What the CVs of a group, or all, feel of gusts.
 struct Felt {

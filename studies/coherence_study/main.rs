@@ -73,7 +73,7 @@ fn collided(groom: &Groom, sample: &Sample, coherence: f64) -> Collided {
         gap: 1e-4,
         offset_root: 1e-4,
         offset_scale: None,
-        loft: 0.0,
+        loft: 0.0.into(),
         coherence,
         at_rest: None,
         blend: 1.0.into(),

@@ -21,15 +21,15 @@ fn laid_down() -> Bench {
 
 #[test]
 fn conforms_to_its_declaration() {
-    // With the default loft, segments of the suite's curves meet nothing.
-    conformance(&NODE).with(|bench| bench.set(LOFT, 0.0)).with(|bench| bench).run();
+    // With loft, segments of the suite's curves meet nothing.
+    conformance(&NODE).with(|bench| bench).with(|bench| bench.set(LOFT, 0.1.into())).run();
 }
 
 #[test]
 fn a_hair_stops_one_gap_above_a_floor() {
     // From half its length above the floor a segment turns down to 30°, minus the gap ÷ its length.
     for gap in [1e-4, 1e-2] {
-        let out = laid_down().input(COLLIDERS, floor(0.0)).set(GAP, gap).set(LOFT, 0.0).cook();
+        let out = laid_down().input(COLLIDERS, floor(0.0)).set(GAP, gap).set(LOFT, 0.0.into()).cook();
         let tip = out.curves().positions()[1];
         let angle = std::f64::consts::FRAC_PI_6 - gap;
         assert!((f64::from(tip[0]) - libm::cos(angle)).abs() < 1e-6, "{tip:?}");
@@ -81,8 +81,8 @@ fn any_number_of_steps_terminates() {
 
 #[test]
 fn any_offset_scale_is_finite_and_keeps_lengths() {
-    for scale in [0.0, 1.0, 1e3] {
-        let out = laid_down().input(COLLIDERS, floor(0.0)).set(OFFSET_SCALE, scale).cook();
+    for scale in [0.0_f32, 1.0, 1e3] {
+        let out = laid_down().input(COLLIDERS, floor(0.0)).set(OFFSET_SCALE, scale.into()).cook();
         assert!(out.curves().positions().as_flattened().iter().all(|x| x.is_finite()));
         assert!(out.metrics["length_error"] < 1e-6);
         assert_eq!(out.metrics["crossings_left"], 0.0, "{scale}");
@@ -141,14 +141,43 @@ fn roots_in_creases_are_lifted_from_both_faces_or_counted() {
 fn loft_keeps_a_share_of_the_height_of_a_curve_blown_flat() {
     let flat = || bench(&NODE).input(CURVES, curve(&[[0.0, 0.01, 0.0], [1.0, 0.01, 0.0]])).input(COLLIDERS, floor(0.0));
     let blown = || flat().input(REST, curve(&[[0.0, 0.01, 0.0], [0.0, 1.01, 0.0]]));
-    for loft in [0.0, 0.1, 0.5] {
-        let out = blown().set(LOFT, loft).cook();
-        assert!((f64::from(out.curves().positions()[1][1]) - 0.01 - loft).abs() < 1e-6, "{loft}");
+    for loft in [0.0_f32, 0.1, 0.5] {
+        let out = blown().set(LOFT, loft.into()).cook();
+        assert!((out.curves().positions()[1][1] - 0.01 - loft).abs() < 1e-6, "{loft}");
     }
     // `coherence` scales it, `offset_scale` replaces it.
     let height = |bench: Bench| bench.cook().curves().positions()[1];
-    assert_eq!(height(blown().set(LOFT, 0.5).set(COHERENCE, 1.0)), height(blown().set(COHERENCE, 1.0)));
-    assert_eq!(height(blown().set(LOFT, 0.5).set(OFFSET_SCALE, 0.2)), height(blown().set(OFFSET_SCALE, 0.2)));
+    assert_eq!(height(blown().set(LOFT, 0.5.into()).set(COHERENCE, 1.0)), height(blown().set(COHERENCE, 1.0)));
+    assert_eq!(
+        height(blown().set(LOFT, 0.5.into()).set(OFFSET_SCALE, 0.2.into())),
+        height(blown().set(OFFSET_SCALE, 0.2.into()))
+    );
+}
+
+#[test]
+fn loft_and_offset_scale_may_be_masked() {
+    let two = |ends: [[f32; 3]; 2]| -> Geometry {
+        let points = [[0.0, 0.01, 0.0], ends[0], [0.0, 0.01, 3.0], ends[1]];
+        let mut curves = Component::curves(vec![2, 2], points.to_vec()).unwrap();
+        curves.set(Attr::<f32>::element("stands"), vec![0.5, 1.0]).unwrap();
+        curves.into()
+    };
+    let blown = || {
+        let (flat, upright) = ([[1.0, 0.01, 0.0], [1.0, 0.01, 3.0]], [[0.0, 1.01, 0.0], [0.0, 1.01, 3.0]]);
+        bench(&NODE)
+            .input(CURVES, two(flat))
+            .input(REST, two(upright))
+            .input(COLLIDERS, floor(0.0))
+            .set(OFFSET_ROOT, 0.0)
+    };
+    // A share of a height of 1 m over the root; of 1.01 m over the skin.
+    let stands = |value: f32| Maskable { value, attribute: Some("stands".into()) };
+    for (param, share, expected) in [(LOFT, 0.4, [0.2, 0.4]), (OFFSET_SCALE, 0.4, [0.192, 0.394])] {
+        let out = blown().set(param, stands(share)).cook();
+        let heights = [1, 3].map(|cv| out.curves().positions()[cv][1] - 0.01);
+        assert!((0..2).all(|k| (heights[k] - expected[k]).abs() < 1e-3), "{}: {heights:?}", param.name());
+    }
+    assert_eq!(blown().set(LOFT, stands(0.0)).cook().curves().positions(), blown().cook().curves().positions());
 }
 
 /// Of two curves blown through the floor the one in the group stops at it, as without a group; the other keeps its bits, and
@@ -164,7 +193,7 @@ fn outside_a_group_curves_keep_their_bits() {
     let rest = goal.map(|[root, _]| [root, [root[0], 1.5, root[2]]]);
     let cook = |name: &str, rows: [i32; 2]| {
         let bench = bench(&NODE).input(CURVES, two(goal, rows)).input(REST, two(rest, [1, 1]));
-        bench.input(COLLIDERS, floor(0.0)).set(GROUP, name.into()).set(LOFT, 0.0).cook()
+        bench.input(COLLIDERS, floor(0.0)).set(GROUP, name.into()).set(LOFT, 0.0.into()).cook()
     };
     let all = cook("", [0, 0]);
     for rows in [[0, 1], [2, 0], [0, 0], [1, 1]] {

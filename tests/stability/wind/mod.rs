@@ -7,6 +7,8 @@
 
 mod colliders;
 mod empty;
+mod groups;
+mod guided;
 mod numbers;
 mod winds;
 
@@ -29,14 +31,16 @@ use crate::page::{self, Outcome, split};
 type Point = [f32; 3];
 type At = Arc<dyn Fn(Frame) -> Geometry + Send + Sync>;
 
-/// The nodes that are checked: the chain, and the nodes that attach and interpolate curves.
-const NODES: [&str; 7] = ["gusts", "lee", "wind", "swing", "out", "grown", "hairs"];
+/// The nodes that are checked: the chain, and the nodes that attach, interpolate, deform and resample curves.
+const NODES: [&str; 9] = ["gusts", "lee", "wind", "swing", "out", "grown", "hairs", "guided", "fine"];
 
 /// The inputs of all nodes in a row.
 #[derive(Clone)]
 struct Scene {
     fur: At,
     skin: At,
+    /// Guides at rest, if they are not the fur itself.
+    posts: Option<At>,
     /// Params by node.
     params: BTreeMap<&'static str, String>,
     fps: f64,
@@ -54,10 +58,13 @@ impl Scene {
             ("lee", ""),
             ("swing", ""),
             ("out", ""),
+            ("guided", ""),
+            ("fine", ""),
         ];
         Self {
             fur: Arc::new(|_| curves(&hairs(20, 5, 0.3))),
             skin: Arc::new(|_| ball()),
+            posts: None,
             params: params.map(|(node, params)| (node, params.to_owned())).into(),
             fps: 24.0,
             refused: &[],
@@ -72,6 +79,10 @@ impl Scene {
         Self { skin: Arc::new(at), ..self }
     }
 
+    fn posts(self, at: impl Fn(Frame) -> Geometry + Send + Sync + 'static) -> Self {
+        Self { posts: Some(Arc::new(at)), ..self }
+    }
+
     /// Replaces the params of a node.
     fn with(mut self, node: &'static str, params: impl Into<String>) -> Self {
         self.params.insert(node, params.into());
@@ -84,6 +95,7 @@ impl Scene {
 
     fn nodes(&self) -> String {
         let params = |node: &str| self.params.get(node).map_or("", String::as_str);
+        let posts = if self.posts.is_some() { "posts" } else { "fur" };
         format!(
             r#"
             "fur": {{ "type": "Curve_In", "params": {{ "points": [[0, 0, 0], [0, 1, 0]] }} }},
@@ -96,13 +108,20 @@ impl Scene {
             "out": {{ "type": "Curve_Wind_Collision",
                      "inputs": {{ "curves": "swing", "rest": "fur", "colliders": ["skin"] }}, "params": {{ {} }} }},
             "grown": {{ "type": "Curve_Attach", "inputs": {{ "curves": "fur", "rest_skin": "still", "skin": "skin" }} }},
-            "hairs": {{ "type": "Curve_Interpolate", "inputs": {{ "guides": "fur", "skin": "skin" }}, "params": {{ {} }} }}"#,
+            "hairs": {{ "type": "Curve_Interpolate", "inputs": {{ "guides": "fur", "skin": "skin" }}, "params": {{ {} }} }},
+            "posts": {{ "type": "Curve_In", "params": {{ "points": [[0, 0, 0], [0, 1, 0]] }} }},
+            "blown": {{ "type": "Curve_Wind", "inputs": {{ "curves": "{posts}" }} }},
+            "guided": {{ "type": "Curve_Deform", "params": {{ {} }}, "inputs": {{
+                "curves": "fur", "rest_guides": "{posts}", "guides": "blown", "rest_skin": "still", "skin": "skin" }} }},
+            "fine": {{ "type": "Curve_Resample", "inputs": {{ "curves": "wind" }}, "params": {{ {} }} }}"#,
             params("gusts"),
             params("lee"),
             params("wind"),
             params("swing"),
             params("out"),
             params("hairs"),
+            params("guided"),
+            params("fine"),
         )
     }
 
@@ -123,7 +142,8 @@ impl Scene {
         let first = (self.skin)(Frame::whole(1));
         let given: [(&str, At); 3] =
             [("fur", self.fur.clone()), ("skin", self.skin.clone()), ("still", Arc::new(move |_| first.clone()))];
-        for (id, at) in given {
+        let posts = self.posts.clone().map(|at| ("posts", at));
+        for (id, at) in given.into_iter().chain(posts) {
             let node = graph.nodes.iter_mut().find(|node| &*node.id == id).unwrap();
             node.body = Body::Given { at, moves: true };
         }
@@ -224,7 +244,7 @@ fn check(what: &str, cooked: &Cooked, frame: usize, fur: Geometry, skin: Geometr
         if let Some(envelope) = made.get(ENVELOPE).filter(|_| fur.get(ENVELOPE).is_none()) {
             assert!(envelope.iter().all(|x| (0.0..=1.0).contains(x)), "{what}: `{node}`");
         }
-        if node != "hairs" {
+        if !["hairs", "fine"].contains(&node) {
             assert_eq!(made.runs(), fur.runs(), "{what}: `{node}`");
             let error = length_error(made, fur);
             assert!(error <= 1e-5, "{what}: `{node}` changes lengths by {error:.1e} of a curve's");
@@ -362,6 +382,12 @@ crate::page::groups! {
     colliders::curves_that_start_inside_a_collider_are_counted_and_do_not_get_deeper,
     colliders::no_kind_of_collider_is_crossed,
     colliders::extreme_steps_and_offsets_keep_the_guarantees,
+    groups::an_empty_group_changes_no_bit_and_a_full_one_is_none,
+    groups::clumps_of_any_numbers_hold,
+    groups::loops_shear_and_fading_hold_at_any_size,
+    guided::any_guides_give_finite_curves_of_the_same_lengths,
+    guided::roots_inside_the_skin_and_thin_skins_are_no_trouble,
+    guided::curves_of_any_shape_are_resampled,
     empty::empty_and_degenerate_curves_pass_through_every_node,
     empty::triangles_without_area_among_others_change_nothing,
     empty::curves_without_a_skin_bend_and_swing,

@@ -6,6 +6,7 @@ use super::half_space::HalfSpace;
 use super::segment_turn::{Nearby, Segment, Turned};
 use super::{Collide, Reached, perpendicular};
 use nalgebra::Quaternion;
+use numerics::masked::Masked;
 use numerics::tree::TriangleTree;
 use numerics::vector::{self, DQuat, DVec3, Vec3, to_f32, to_f64};
 
@@ -211,16 +212,24 @@ impl Hair<'_> {
     #[inline(always)]
     pub(super) fn set_goals(&self, how: &Collide<'_>, shift: &DVec3, goals: &mut Vec<DVec3>) {
         goals.clear();
-        let loft = how.loft * (1.0 - how.coherence);
+        let loft = how.loft.value * (1.0 - how.coherence);
         match (how.offset_scale, &how.skin) {
-            (Some(scale), Some(skin)) => {
-                self.raise_goals(shift, goals, |k, before, step| skin.raised(self.rest[k], before, step, scale))
-            }
+            (Some(scale), Some(skin)) => self.raise_goals(shift, goals, |k, before, step| {
+                skin.raised(self.rest[k], before, step, scale.value * self.factor(&scale, k))
+            }),
             (None, _) if loft > 0.0 && self.up != DVec3::zeros() => {
-                self.raise_goals(shift, goals, |k, before, step| self.lofted(k, before, step, loft));
+                self.raise_goals(shift, goals, |k, before, step| {
+                    self.lofted(k, before, step, (loft * self.factor(&how.loft, k)).min(1.0))
+                });
             }
             _ => goals.extend(self.goal.iter().map(|cv| to_f64(*cv) + shift)),
         }
+    }
+
+    /// What a mask scales a number by at CV k, 0 or more.
+    #[inline(always)]
+    fn factor(&self, number: &Masked<'_, f64>, k: usize) -> f64 {
+        f64::from(number.factor(self.first + k)).max(0.0)
     }
 
     /// Goals from the root on, each segment replaced by what `raised` makes of its CV, the goal before it, and its step

@@ -26,11 +26,15 @@ const OPPOSITE: f64 = 0.01;
 pub(super) struct HalfSpace {
     /// Its direction, at most of length 1.
     up: Vec3,
-    /// Distance from the root, metres, within which all obstacles are known.
-    reach: f32,
-    /// The highest point of obstacles there above the root, metres.
-    rise: f32,
+    /// Distances from the root, metres, ascending; what is not known has a distance of 0.
+    reaches: [f32; SHELLS],
+    /// The highest point of obstacles within each of these distances, above the root, metres. Segments near the root need
+    /// to be above what is near it alone.
+    rises: [f32; SHELLS],
 }
+
+/// Number of distances: a curve of five CVs has a segment more within each.
+const SHELLS: usize = 4;
 
 impl HalfSpace {
     /// The half-space of the curve `cvs`, displaced by `shift`, whose largest diameter is `width` metres.
@@ -38,7 +42,12 @@ impl HalfSpace {
     pub(super) fn of(cvs: &[Vec3], shift: &DVec3, width: f64, how: &Collide<'_>) -> Self {
         let root = to_f64(cvs[0]) + shift;
         let length: f64 = cvs.windows(2).map(|ends| (to_f64(ends[1]) - to_f64(ends[0])).norm()).sum();
-        let reach = 1.001 * (length + how.gap) + 2.0 * width;
+        // Segments of even length end a little within the distance of a shell.
+        let reach_of = |shell: usize| {
+            let share = if shell + 1 == SHELLS { 1.0 } else { 1.02 * (shell + 1) as f64 / SHELLS as f64 };
+            1.001 * (share * length + how.gap) + 2.0 * width
+        };
+        let reach = reach_of(SHELLS - 1);
         let scale = f64::from(vector::largest(to_f32(root))) + reach;
         let slack = ROUNDING * scale;
         let Some((up, facet)) = how.skin.as_ref().and_then(|skin| skin.facet(&root, SAME_SIDE)) else {
@@ -47,8 +56,8 @@ impl HalfSpace {
         // Shortened by more than the rounding to f32 may lengthen it.
         let up = to_f32(up * (1.0 - 1e-6));
         let mut above = Above {
-            low: to_f32(root.map(|x| x - reach - 8.0 * slack)),
-            high: to_f32(root.map(|x| x + reach + 8.0 * slack)),
+            low: to_f32(root),
+            high: to_f32(root),
             root: to_f32(root),
             up,
             rise: f64::NEG_INFINITY,
@@ -57,18 +66,47 @@ impl HalfSpace {
             reach: reach as f32,
         };
         above.add(&facet, &root);
-        for tree in how.obstacles {
-            let mut walk = tree.walk(above);
-            while let Some((block, lanes)) = walk.next() {
-                walk.region().add_lanes(&tree.blocks()[block], lanes, &root);
-                // No segment starts higher than the curve is long.
-                if walk.region().rise > length {
-                    return Self::default();
+        let mut known = Self { up, ..Self::default() };
+        for shell in 0..SHELLS {
+            let reach = reach_of(shell);
+            above.low = to_f32(root.map(|x| x - reach - 8.0 * slack));
+            above.high = to_f32(root.map(|x| x + reach + 8.0 * slack));
+            for tree in how.obstacles {
+                let mut walk = tree.walk(above);
+                while let Some((block, lanes)) = walk.next() {
+                    walk.region().add_lanes(&tree.blocks()[block], lanes, &root);
+                    // No segment starts higher than the curve is long.
+                    if walk.region().rise > length {
+                        return known;
+                    }
                 }
+                above = *walk.region();
             }
-            above = *walk.region();
+            (known.reaches[shell], known.rises[shell]) = (reach as f32, ((above.rise + slack) as f32).next_up());
         }
-        Self { up, reach: reach as f32, rise: ((above.rise + slack) as f32).next_up() }
+        known
+    }
+
+    /// The rise within the least known distance that is `needed` metres more than that of a point `away` from the root;
+    /// infinite where none is.
+    #[inline(always)]
+    fn rise(&self, away: &DVec3, needed: f64) -> f64 {
+        let square = away.norm_squared();
+        for shell in 0..SHELLS {
+            let room = f64::from(self.reaches[shell]) - needed;
+            if room > 0.0 && square <= room * room {
+                return f64::from(self.rises[shell]);
+            }
+        }
+        f64::INFINITY
+    }
+
+    /// Whether a segment between two points, of a curve with this root, is above all obstacles near it.
+    #[inline(always)]
+    pub(super) fn clears(&self, root: &DVec3, [from, to]: [&DVec3; 2], rounding: f64) -> bool {
+        let (up, from, to) = (to_f64(self.up), from - root, to - root);
+        let farther = if from.norm_squared() > to.norm_squared() { from } else { to };
+        up.dot(&from).min(up.dot(&to)) > self.rise(&farther, 4.0 * rounding) + 4.0 * rounding
     }
 
     /// Whether the turn of a segment, of a curve with this root, meets nothing: it stays above all obstacles by more
@@ -77,15 +115,14 @@ impl HalfSpace {
     pub(super) fn frees(&self, root: &DVec3, segment: &Segment) -> bool {
         let Segment { pivot, from, to, length, half, gap, rounding, .. } = segment;
         let away = pivot - root;
-        let room = f64::from(self.reach) - (length + gap + 3.0 * half + 4.0 * rounding);
+        let rise = self.rise(&away, length + gap + 3.0 * half + 4.0 * rounding);
         let (up, facing) = (to_f64(self.up), 1.0 + from.dot(to));
-        let in_reach = room > 0.0 && away.norm_squared() <= room * room;
-        if !in_reach || !facing.is_finite() || facing < OPPOSITE {
+        if rise == f64::INFINITY || !facing.is_finite() || facing < OPPOSITE {
             return false;
         }
         // Height of the pivot above everything, and a lower bound of the slopes of the turn: that of an end if both
         // rise, else that of the middle of a turn between two ends as low as the lower one.
-        let height = up.dot(&away) - f64::from(self.rise) - rounding;
+        let height = up.dot(&away) - rise - rounding;
         let slope = from.dot(&up).min(to.dot(&up));
         let lowest = if slope < 0.0 { (slope * (2.0 / facing).sqrt()).max(-1.0) } else { slope };
         // A point at radius r whose height differs by d lies an arc of at least d from the segment's.

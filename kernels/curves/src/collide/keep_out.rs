@@ -1,21 +1,22 @@
 //! Curves that were moved without regard to the skin, kept out of it: the kernel of Curve_Deform's `keep_out`.
 //!
 //! Most curves that follow collided guides do not cross the skin. One that stays above everything near its root (see
-//! [`half_space`](super::half_space)) needs no query of the tree; of the others, those that cross the skin turn again
-//! from their rest shape until they meet it, as in [`super::collide()`], and then as far back towards their goal as they
-//! stay free: a curve that only just enters the skin moves by little, so that none jumps as it touches it.
+//! [`half_space`](super::half_space)) needs no query of the tree, and of the others segments that do so need none. Those
+//! that cross the skin are blended with their rest shape, segment by segment by the same share, as little as leaves them
+//! free: a curve that only just enters the skin moves by little, so that none jumps as it touches it.
 //!
 //! A curve whose root has been lifted off the skin starts from its rest shape lifted as far. One whose rest shape crosses the
-//! skin is lifted until its root is outside by the gap, and turned out of the skin as far as possible. Of a curve that is
+//! skin is lifted until its root is outside by the gap; if it still crosses, it is turned out of the skin as far as
+//! possible, as in [`super::collide()`], and back towards its goal. Of a curve that is
 //! not lifted the start, which touches the skin, is not tested. Surfaces are obstacles, not volumes: a curve wholly inside
 //! stays there.
 
 use super::crossing::first_crossing;
-use super::hair::{SKIPPED_GAPS, part_way};
+use super::hair::SKIPPED_GAPS;
 use super::half_space::HalfSpace;
-use super::segment_turn::{Nearby, Segment, gather};
+use super::segment_turn::{Nearby, gather};
 use super::{Collide, ContactMethod, SkinSurface, collide, perpendicular};
-use crate::attach::{RootPose, attach_curve};
+use crate::attach::{RootPose, attach_curve, relative_stretch};
 use numerics::masked::Masked;
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
@@ -31,8 +32,8 @@ const TASK_CURVES: usize = 256;
 /// Number of curves that enter the skin in a task.
 const SETTLED_CURVES: usize = 64;
 
-/// Halvings of the turn between a curve's goal and where its collision left it.
-const HALVINGS: usize = 4;
+/// Halvings of the turn between a curve's goal and where it is free.
+const HALVINGS: usize = 7;
 
 /// Height of a root, in gaps, from which on its curve is tested from its root on: from a height h a segment turns by an arc
 /// of π/2·h before it meets a plane, which is more than the gap.
@@ -96,10 +97,11 @@ pub(super) fn keep_out_on(path: Path, starts: &[u32], points: &mut [Vec3], how: 
     let entered = parallel::concat(entered);
     let mut kept =
         KeptOut { started_inside: entered.iter().map(|one| u64::from(one.at_rest)).sum(), ..KeptOut::default() };
-    for lifted in [false, true] {
-        let curves: Vec<Entering> = entered.iter().filter(|one| one.lifted == lifted).copied().collect();
+    for (lifted, at_rest) in [(false, false), (true, false), (true, true)] {
+        let alike = |one: &&Entering| (one.lifted, one.at_rest) == (lifted, at_rest);
+        let curves: Vec<Entering> = entered.iter().filter(alike).copied().collect();
         if !curves.is_empty() {
-            turn_out(path, starts, points, how, &curves, &mut kept);
+            turn_out(path, starts, points, how, &curves, half_spaces, &mut kept);
         }
     }
     kept
@@ -124,16 +126,17 @@ fn shifted(cvs: &mut [Vec3], shift: &DVec3) {
     }
 }
 
-/// Turns curves, all or none of them lifted, out of the skin.
+/// Turns curves, all or none of them lifted and crossing the skin at rest, out of the skin.
 fn turn_out(
     path: Path,
     starts: &[u32],
     points: &mut [Vec3],
     how: &KeepOut<'_>,
     curves: &[Entering],
+    half_spaces: &[HalfSpace],
     kept: &mut KeptOut,
 ) {
-    let lifted = curves[0].lifted;
+    let Entering { lifted, at_rest, .. } = curves[0];
     let range = |one: &Entering| starts[one.curve as usize] as usize..starts[one.curve as usize + 1] as usize;
     let (mut own, mut goal, mut rest) = (vec![0], Vec::new(), Vec::new());
     for one in curves {
@@ -144,27 +147,32 @@ fn turn_out(
         how.write_rest(one.curve as usize, cvs, goal[first], &mut rest[first..]);
         own.push(goal.len() as u32);
     }
+    // Where the rest shape is free, it is where a curve turns to.
     let obstacles = [how.skin.tree];
-    let collided = collide(&own, &rest, &goal, &how.collision(&obstacles, lifted));
+    let collided = at_rest.then(|| collide(&own, &rest, &goal, &how.collision(&obstacles, lifted)));
     let found = Entered {
         starts: &own,
         rest: &rest,
         goal: &goal,
-        free: &collided.points,
-        crossings: &collided.crossings,
+        free: collided.as_ref().map_or(&rest, |collided| &collided.points),
+        crossings: collided.as_ref().map_or(&[], |collided| &collided.crossings),
         untested: how.untested(lifted),
     };
     let tasks = (0..curves.len()).step_by(SETTLED_CURVES).map(|first| first..curves.len().min(first + SETTLED_CURVES));
-    let settled = parallel::map(tasks, |_, curves| settle(path, curves, &found, how.skin.tree));
+    let known = |one: &Entering| {
+        let curve = one.curve as usize;
+        half_spaces.get(curve).map(|known| (known, how.root(curve, starts[curve] as usize)))
+    };
+    let known: Vec<Option<(&HalfSpace, DVec3)>> = curves.iter().map(known).collect();
+    let settled = parallel::map(tasks, |_, curves| settle(path, curves, &found, &known, how.skin.tree));
     let settled = parallel::concat(settled);
     for (one, ends) in curves.iter().zip(own.windows(2)) {
         let (mine, now) = (ends[0] as usize..ends[1] as usize, range(one));
         kept.kept_out += u64::from(settled[mine.clone()] != points[now.clone()]);
+        kept.length_error = kept.length_error.max(relative_stretch(&settled[mine.clone()], &goal[mine.clone()]));
         points[now].copy_from_slice(&settled[mine]);
     }
-    kept.crossings_left += collided.crossings_left;
-    // Those that settled have lengths as exact.
-    kept.length_error = kept.length_error.max(collided.length_error);
+    kept.crossings_left += collided.map_or(0, |collided| collided.crossings_left);
 }
 
 /// Curves that entered the skin.
@@ -173,7 +181,7 @@ struct Entered<'a> {
     starts: &'a [u32],
     rest: &'a [Vec3],
     goal: &'a [Vec3],
-    /// As the collision left them, and the number of segments that cross the skin.
+    /// Where they are free, and the number of segments that cross the skin even there; none if that is known.
     free: &'a [Vec3],
     crossings: &'a [i32],
     /// Length at the start of each that is not tested.
@@ -181,29 +189,40 @@ struct Entered<'a> {
 }
 
 kernel! {
-    /// The shapes of `curves`, as near to their goals as they stay free.
-    fn settle(curves: Range<usize>, entered: &Entered<'_>, skin: &TriangleTree) -> Vec<Vec3> = settle_task;
+    /// The shapes of `curves`, as near to their goals as they stay free; `known` is a half-space of each and its root.
+    fn settle(
+        curves: Range<usize>,
+        entered: &Entered<'_>,
+        known: &[Option<(&HalfSpace, DVec3)>],
+        skin: &TriangleTree,
+    ) -> Vec<Vec3> = settle_task;
 }
 
 #[inline(always)]
-fn settle_task(curves: Range<usize>, entered: &Entered<'_>, skin: &TriangleTree) -> Vec<Vec3> {
+fn settle_task(
+    curves: Range<usize>,
+    entered: &Entered<'_>,
+    known: &[Option<(&HalfSpace, DVec3)>],
+    skin: &TriangleTree,
+) -> Vec<Vec3> {
     let mut out = entered.free[entered.starts[curves.start] as usize..entered.starts[curves.end] as usize].to_vec();
     let (base, untested) = (entered.starts[curves.start] as usize, entered.untested);
-    let (mut nearby, mut pose) = (Nearby::default(), Vec::new());
+    let (mut nearby, mut pose, mut turns) = (Nearby::default(), Vec::new(), Vec::new());
     for curve in curves {
         let cvs = entered.starts[curve] as usize..entered.starts[curve + 1] as usize;
         let [rest, goal, free] = [entered.rest, entered.goal, entered.free].map(|points| &points[cvs.clone()]);
         // Of a curve that could not be freed no pose is better.
-        if entered.crossings[curve] > 0 {
+        if !entered.crossings.is_empty() && entered.crossings[curve] > 0 {
             continue;
         }
         // No closures here: they are not compiled for the kernel's path.
         let outside = tested_start(rest, untested);
+        turns_between(goal, free, &mut turns);
         let (mut crossing, mut clear) = (0.0, 1.0);
         for _ in 0..HALVINGS {
             let share = 0.5 * (crossing + clear);
-            pose_between(goal, free, share, &mut pose);
-            if crosses(&pose, [outside, tested_start(&pose, untested)], skin, &mut nearby) {
+            pose_at(goal[0], &turns, share, &mut pose);
+            if crosses(&pose, [outside, tested_start(&pose, untested)], skin, known[curve].as_ref(), &mut nearby) {
                 crossing = share;
             } else {
                 clear = share;
@@ -214,18 +233,45 @@ fn settle_task(curves: Range<usize>, entered: &Entered<'_>, skin: &TriangleTree)
     out
 }
 
-/// The curve whose segments, as long as those of `from`, have turned by this share of their turn from `from` to `to`.
-fn pose_between(from: &[Vec3], to: &[Vec3], share: f64, pose: &mut Vec<Vec3>) {
-    pose.clear();
-    let mut at = to_f64(from[0]);
-    pose.push(from[0]);
+/// The turn of a segment in its plane.
+struct SegmentTurn {
+    /// Its direction, and the one a right angle on.
+    from: DVec3,
+    side: DVec3,
+    /// Radians.
+    angle: f64,
+    /// Metres.
+    length: f64,
+}
+
+/// The turns of segments from those of `from` to those of `to`, which keep the lengths of `from`.
+#[inline(always)]
+fn turns_between(from: &[Vec3], to: &[Vec3], turns: &mut Vec<SegmentTurn>) {
+    turns.clear();
     for k in 0..from.len() - 1 {
-        let [from, to] = [from, to].map(|cvs| to_f64(cvs[k + 1]) - to_f64(cvs[k]));
-        if let (Some(before), Some(after)) = (from.try_normalize(0.0), to.try_normalize(0.0)) {
-            let direction = part_way(&before, &after, &perpendicular(&before, &DVec3::zeros()), share);
-            at = to_f64(pose[k]) + direction * from.norm();
+        let [along, towards] = [from, to].map(|cvs| to_f64(cvs[k + 1]) - to_f64(cvs[k]));
+        let (length, other) = (along.norm(), towards.norm());
+        if length == 0.0 || other == 0.0 {
+            turns.push(SegmentTurn { from: along, side: DVec3::zeros(), angle: 0.0, length: 1.0 });
+            continue;
         }
-        pose.push(to_f32(at));
+        let (from, to) = (along / length, towards / other);
+        let axis = from.cross(&to);
+        let sine = axis.norm();
+        let axis = if sine > 1e-9 { axis / sine } else { perpendicular(&from, &DVec3::zeros()) };
+        turns.push(SegmentTurn { from, side: axis.cross(&from), angle: libm::atan2(sine, from.dot(&to)), length });
+    }
+}
+
+/// The curve from `root` whose segments have turned by this share.
+#[inline(always)]
+fn pose_at(root: Vec3, turns: &[SegmentTurn], share: f64, pose: &mut Vec<Vec3>) {
+    pose.clear();
+    pose.push(root);
+    for (k, turn) in turns.iter().enumerate() {
+        let (sine, cosine) = libm::sincos(share * turn.angle);
+        let direction = turn.from * cosine + turn.side * sine;
+        pose.push(to_f32(to_f64(pose[k]) + direction * turn.length));
     }
 }
 
@@ -265,7 +311,7 @@ impl KeepOut<'_> {
             // Lifts nothing without a skin; it says whether the start of a curve is tested.
             offset_root: if lifted { self.gap } else { 0.0 },
             offset_scale: None,
-            loft: 0.0,
+            loft: 0.0.into(),
             at_rest: None,
             blend: Masked::uniform(1.0),
             width: Masked::uniform(0.0),
@@ -338,20 +384,21 @@ fn entering_task(
         let root = how.root(curve, cvs.start);
         let lifted = (to_f64(now[0]) - root).norm() >= LIFTED * how.gap;
         let untested = how.untested(lifted);
-        if let Some(half_space) = half_spaces.get(curve)
-            && frees(half_space, &root, now, untested)
+        let known = half_spaces.get(curve).zip(Some(root));
+        if let Some(known) = &known
+            && is_clear(known, now, tested_start(now, untested))
         {
             continue;
         }
         rest.resize(now.len(), [0.0; 3]);
         how.write_rest(curve, cvs, now[0], &mut rest);
-        let (outside, start) = (tested_start(&rest, untested), tested_start(now, untested));
-        if crosses(now, [outside, start], how.skin.tree, &mut nearby) {
+        let (outside, start, tree) = (tested_start(&rest, untested), tested_start(now, untested), how.skin.tree);
+        if crosses(now, [outside, start], tree, known.as_ref(), &mut nearby) {
             let mut one = Entering { curve: curve as u32, at_rest: false, lifted, shift: DVec3::zeros() };
-            if crosses(&rest, [outside; 2], how.skin.tree, &mut nearby) {
+            if crosses(&rest, [outside; 2], tree, known.as_ref(), &mut nearby) {
                 (one.lifted, one.shift) = (true, how.skin.lift(now[0], how.gap).shift);
                 shifted(&mut rest, &one.shift);
-                one.at_rest = crosses(&rest, [Some(rest[0]); 2], how.skin.tree, &mut nearby);
+                one.at_rest = crosses(&rest, [Some(rest[0]); 2], tree, known.as_ref(), &mut nearby);
             }
             entered.push(one);
         }
@@ -363,32 +410,24 @@ fn is_finite(cvs: &[Vec3]) -> bool {
     cvs.as_flattened().iter().all(|x| x.is_finite())
 }
 
-/// Whether all of a curve, but the length at its start that is not tested, is in the half-space of a curve with this root.
+/// Rounding of positions up to this size and length.
 #[inline(always)]
-fn frees(half_space: &HalfSpace, root: &DVec3, cvs: &[Vec3], untested: f64) -> bool {
-    let largest = cvs.iter().fold(0.0, |most: f32, cv| most.max(vector::largest(*cv)));
+fn rounding_of(a: Vec3, b: Vec3) -> f64 {
+    5e-7 * f64::from(vector::largest(a).max(vector::largest(b)))
+}
+
+/// Whether a segment of a curve with this root is in its half-space.
+#[inline(always)]
+fn is_free((half_space, root): &(&HalfSpace, DVec3), a: Vec3, b: Vec3) -> bool {
+    half_space.clears(root, [&to_f64(a), &to_f64(b)], rounding_of(a, b))
+}
+
+/// Whether all of a curve from `start` in its first segment on (`None`: from the second) is in its half-space.
+#[inline(always)]
+fn is_clear(known: &(&HalfSpace, DVec3), cvs: &[Vec3], start: Option<Vec3>) -> bool {
     for k in 0..cvs.len() - 1 {
-        let (pivot, along) = (to_f64(cvs[k]), to_f64(cvs[k + 1]) - to_f64(cvs[k]));
-        let whole = along.norm();
-        let inner = if k == 0 { untested } else { 0.0 };
-        if whole <= inner {
-            continue;
-        }
-        let direction = along / whole;
-        let length = whole - inner;
-        let segment = Segment {
-            pivot: pivot + direction * inner,
-            from: direction,
-            to: direction,
-            axis: DVec3::zeros(),
-            before: DVec3::zeros(),
-            length,
-            half: 0.0,
-            gap: 0.0,
-            inner: 0.0,
-            rounding: 1.2e-7 * (f64::from(largest) + whole),
-        };
-        if !half_space.frees(root, &segment) {
+        let Some(from) = (if k == 0 { start } else { Some(cvs[k]) }) else { continue };
+        if !is_free(known, from, cvs[k + 1]) {
             return false;
         }
     }
@@ -404,36 +443,50 @@ fn tested_start(cvs: &[Vec3], untested: f64) -> Option<Vec3> {
 }
 
 /// Whether a curve, whose tested part starts at `start`, crosses the skin. So does one whose start has passed through it
-/// since rest, when it was at `outside`.
+/// since rest, when it was at `outside`. Segments in the half-space of the curve need no query.
 #[inline(always)]
 fn crosses<'t>(
     cvs: &[Vec3],
     [outside, start]: [Option<Vec3>; 2],
     tree: &'t TriangleTree,
+    known: Option<&(&HalfSpace, DVec3)>,
     nearby: &mut Nearby<'t>,
 ) -> bool {
     let last = cvs.len() - 1;
     for first in (0..last).step_by(GATHERED_SEGMENTS) {
         let end = last.min(first + GATHERED_SEGMENTS);
-        let (mut low, mut high) = (cvs[first], cvs[first]);
-        let also = outside.filter(|_| first == 0);
-        for cv in cvs[first + 1..=end].iter().chain(&also) {
-            for axis in 0..3 {
-                low[axis] = low[axis].min(cv[axis]);
-                high[axis] = high[axis].max(cv[axis]);
+        let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        let mut tested = [false; GATHERED_SEGMENTS];
+        for k in first..end {
+            let Some(from) = (if k == 0 { start } else { Some(cvs[k]) }) else { continue };
+            if let Some(known) = known
+                && is_free(known, from, cvs[k + 1])
+            {
+                continue;
             }
+            tested[k - first] = true;
+            let also = if k == 0 { outside } else { None };
+            for cv in [Some(from), Some(cvs[k + 1]), also].into_iter().flatten() {
+                for axis in 0..3 {
+                    low[axis] = low[axis].min(cv[axis]);
+                    high[axis] = high[axis].max(cv[axis]);
+                }
+            }
+        }
+        if low[0] > high[0] {
+            continue;
         }
         gather(&[tree], low, high, nearby);
         if nearby.is_empty() {
             continue;
         }
-        for k in first..end {
+        for k in (first..end).filter(|k| tested[k - first]) {
             let Some(from) = (if k == 0 { start } else { Some(cvs[k]) }) else { continue };
             if first_crossing(nearby, from, cvs[k + 1]).is_some() {
                 return true;
             }
         }
-        if let (Some(outside), Some(start), 0) = (outside, start, first)
+        if let (Some(outside), Some(start), true) = (outside, start, first == 0 && tested[0])
             && outside != start
             && first_crossing(nearby, outside, start).is_some()
         {

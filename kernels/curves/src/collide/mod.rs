@@ -61,11 +61,11 @@ pub struct Collide<'a> {
     pub gap: f64,
     /// Height above the skin to which roots are lifted, metres; 0 leaves them.
     pub offset_root: f64,
-    /// Raises goals to at least this multiple of the curves' height above the skin at rest.
-    pub offset_scale: Option<f64>,
+    /// Raises goals to at least this multiple of the curves' height above the skin at rest; a mask has one value for each CV.
+    pub offset_scale: Option<Masked<'a, f64>>,
     /// Share of its height at rest, above the root's tangent plane, that a CV's goal keeps, 0..1; scaled by
-    /// 1 − `coherence`, and not used with `offset_scale`.
-    pub loft: f64,
+    /// 1 − `coherence`, and not used with `offset_scale`; a mask has one value for each CV.
+    pub loft: Masked<'a, f64>,
     /// The result of [`at_rest`] for the same curves, if known.
     pub at_rest: Option<&'a AtRest>,
     /// Fraction of each segment's collision response that is kept, 0..1.

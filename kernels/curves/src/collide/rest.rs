@@ -73,7 +73,7 @@ fn grow_task(starts: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut [Grow
         if let Some(skin) = &how.skin {
             let lifted = skin.lift(cvs[0], how.offset_root);
             (grown.shift, grown.low) = (lifted.shift, lifted.low);
-            if how.loft > 0.0 {
+            if how.loft.value > 0.0 {
                 grown.up = skin.facet(&to_f64(cvs[0]), SAME_SIDE).map_or(DVec3::zeros(), |(up, _)| up);
             }
         }

@@ -86,7 +86,7 @@ fn plain<'a>(obstacles: &'a [&'a TriangleTree], method: ContactMethod, gap: f64)
         gap,
         offset_root: gap,
         offset_scale: None,
-        loft: 0.0,
+        loft: 0.0.into(),
         at_rest: None,
         blend: 1.0.into(),
         width: 0.0.into(),

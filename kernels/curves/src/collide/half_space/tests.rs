@@ -50,7 +50,7 @@ fn what_a_half_space_frees_the_trees_free_too() {
             gap,
             offset_root: 0.0,
             offset_scale: None,
-            loft: 0.0,
+            loft: 0.0.into(),
             at_rest: None,
             blend: Masked::uniform(1.0),
             width: Masked::uniform(0.0),
@@ -123,15 +123,19 @@ fn rise_is_the_highest_corner_in_reach() {
         gap: 1e-4,
         offset_root: 0.0,
         offset_scale: None,
-        loft: 0.0,
+        loft: 0.0.into(),
         at_rest: None,
         blend: Masked::uniform(1.0),
         width: Masked::uniform(0.0),
     };
-    let rise = |length: f32| HalfSpace::of(&[[0.0; 3], [0.0, 0.0, length]], &DVec3::zeros(), 0.0, &how).rise;
+    let rise =
+        |length: f32| HalfSpace::of(&[[0.0; 3], [0.0, 0.0, length]], &DVec3::zeros(), 0.0, &how).rises[SHELLS - 1];
     assert!(rise(0.15).abs() < 1e-6, "{}", rise(0.15));
     assert!((rise(0.5) - 0.1).abs() < 1e-6, "{}", rise(0.5));
-    // A bump higher than the curve is long: nothing is freed.
+    // Near the root only what is near it counts.
+    let near = HalfSpace::of(&[[0.0; 3], [0.0, 0.0, 0.5]], &DVec3::zeros(), 0.0, &how);
+    assert!(near.rises[0].abs() < 1e-6 && near.rises.is_sorted() && near.reaches.is_sorted(), "{near:?}");
+    // A bump higher than the curve is long: nothing is freed as far out.
     let low = HalfSpace::of(&[[0.15, 0.0, 0.0], [0.15, 0.0, 0.09]], &DVec3::zeros(), 0.0, &how);
-    assert_eq!(low, HalfSpace::default());
+    assert_eq!(low.reaches[SHELLS - 1], 0.0);
 }

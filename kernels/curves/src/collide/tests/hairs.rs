@@ -14,7 +14,7 @@ pub(super) fn on<'a>(obstacles: &'a [&'a TriangleTree]) -> Collide<'a> {
         gap: 1e-4,
         offset_root: 1e-4,
         offset_scale: None,
-        loft: 0.0,
+        loft: 0.0.into(),
         coherence: 0.0,
         at_rest: None,
         blend: WHOLE,
@@ -235,7 +235,7 @@ fn the_skin_lifts_roots_and_keeps_goals_off() {
     // A facet of π/48 by π/48 lies up to 2 (1 − cos(π/96)) below the sphere.
     assert!(roots.iter().all(|height| (0.0089..0.0101).contains(height)), "{roots:?}");
     for scale in [1.0, 0.5] {
-        let kept = Collide { skin: Some(skin), offset_root: 0.0, offset_scale: Some(scale), ..on(&obstacles) };
+        let kept = Collide { skin: Some(skin), offset_root: 0.0, offset_scale: Some(scale.into()), ..on(&obstacles) };
         let out = collide(&starts, &rest, &goal, &kept);
         // Lengths are kept, so a CV lies slightly lower than requested, especially at a bend.
         let share: Vec<f64> = out.points.iter().zip(&rest).map(|(now, rest)| height(now) / height(rest)).collect();
@@ -318,7 +318,8 @@ fn any_threads_and_any_path_give_the_same_bits() {
     let normals = normals(&mesh.0, &mesh.1);
     let skin = SkinSurface { tree: &tree, triangles: &mesh.1, normals: &normals };
     let (starts, rest, goal) = fur(500, 5, 0.4, DVec3::x());
-    let how = Collide { skin: Some(skin), offset_scale: Some(0.3), width: Masked::uniform(1e-3), ..on(&obstacles) };
+    let how =
+        Collide { skin: Some(skin), offset_scale: Some(0.3.into()), width: Masked::uniform(1e-3), ..on(&obstacles) };
     let expected = collide(&starts, &rest, &goal, &how);
     for path in Path::all() {
         for threads in [1, 2, 7] {

@@ -12,8 +12,13 @@ fn kept_heights(fur: &kept::Fur, share: f64, error: f64) -> (usize, f64) {
     let normals = normals(points, triangles);
     let skin = SkinSurface { tree: &tree, triangles, normals: &normals };
     let obstacles = [&tree];
-    let how =
-        Collide { skin: Some(skin), offset_scale: Some(share), offset_root: 0.0, gap: 1e-6, ..hairs::on(&obstacles) };
+    let how = Collide {
+        skin: Some(skin),
+        offset_scale: Some(share.into()),
+        offset_root: 0.0,
+        gap: 1e-6,
+        ..hairs::on(&obstacles)
+    };
     let out = collide(&fur.starts, &fur.rest, &fur.goal, &how);
     assert!(out.length_error < 1e-5, "{}", out.length_error);
     let height = |p: Vec3| skin.height(&to_f64(p), f32::INFINITY).unwrap().0;
@@ -56,7 +61,7 @@ fn loft_keeps_its_share_of_heights_over_the_root_and_leaves_what_is_higher() {
     let how = Collide { skin: Some(skin), offset_root: 0.0, ..hairs::on(&obstacles) };
     let up = DVec3::y();
     for share in [0.1, 0.5, 1.0] {
-        let how = Collide { loft: share, ..how.clone() };
+        let how = Collide { loft: share.into(), ..how.clone() };
         let kept = at_rest(&fur.starts, &fur.rest, &how);
         let (mut lofted, mut same, mut goals) = (0, 0, Vec::new());
         for (curve, ends) in fur.starts.windows(2).enumerate() {
@@ -88,7 +93,7 @@ fn loft_keeps_its_share_of_heights_over_the_root_and_leaves_what_is_higher() {
         assert!(lofted > 50 && same > 5, "{share}: {lofted}, {same}");
     }
     let with = |loft: f64, coherence: f64| {
-        collide(&fur.starts, &fur.rest, &fur.goal, &Collide { loft, coherence, ..how.clone() })
+        collide(&fur.starts, &fur.rest, &fur.goal, &Collide { loft: loft.into(), coherence, ..how.clone() })
     };
     assert_eq!(with(0.3, 1.0), with(0.0, 1.0));
     assert_ne!(with(0.3, 0.0).points, with(0.0, 0.0).points);
