@@ -17,7 +17,7 @@
 use crate::shared::direction::unit_direction;
 use crate::shared::group::{self, Group};
 use crate::shared::gust_control;
-use curves::gusts::{Control, Draw, Gust, Gusts, Influence, Plane, Sphere, evaluate, scale};
+use curves::gusts::{Control, Draw, Gust, Gusts, Influence, Plane, Sphere, bounds, evaluate, scale};
 use engine::prelude::*;
 use numerics::ramp::Ramp;
 use numerics::vector::DVec3;
@@ -204,7 +204,7 @@ fn controls(cx: &FrameCx) -> Result<Vec<Control>> {
 
 /// The gusts alive at this frame, and how many were left out.
 fn sent(cx: &FrameCx) -> (Vec<Sphere>, u64) {
-    let Some(bounds) = cx.part_at_start(CURVES).bounds() else { return (Vec::new(), 0) };
+    let Some(bounds) = bounds(cx.part_at_start(CURVES).positions()) else { return (Vec::new(), 0) };
     let ends = |range: Param<Span>| {
         let Span { low, high } = cx.get(range);
         [low, high]

@@ -20,7 +20,7 @@ mod profile;
 
 use block::block_values;
 pub use control::{AXIS_ROWS, Control, ControlShape, outline};
-use cull::{Boxes, NOWHERE, bounds_of, join, meeting};
+use cull::{Boxes, bounds_of, meeting};
 pub use draw::{Draw, Gust, Living, MOST_LIVING};
 pub use launch::Plane;
 use numerics::parallel;
@@ -83,6 +83,11 @@ const LUMPS: f32 = 1.5;
 
 /// Fraction by which bounds are enlarged for culling: more than all rounding errors together.
 const MARGIN: f64 = 1e-4;
+
+/// The least and largest coordinates of points; `None` without points.
+pub fn bounds(points: &[[f32; 3]]) -> Option<[[f32; 3]; 2]> {
+    (!points.is_empty()).then(|| bounds_of(Path::chosen(), points))
+}
 
 /// The value of each point.
 ///
@@ -147,16 +152,14 @@ impl<'a> Prepared<'a> {
 
     /// Writes the values of a task's points; returns how many of them any influence reaches.
     fn task(&self, path: Path, points: &[[f32; 3]], out: &mut [f32]) -> usize {
-        let mut bounds = [NOWHERE; TASK / BLOCK];
-        let mut whole = NOWHERE;
-        for (points, bounds) in points.chunks(BLOCK).zip(&mut bounds) {
-            *bounds = bounds_of(path, points);
-            whole = join(whole, *bounds);
+        // Of most tasks no gust is near: then blocks need no bounds of their own.
+        let near = meeting(path, &self.boxes, &bounds_of(path, points));
+        if near.len() == 0 {
+            return 0;
         }
-        let near = meeting(path, &self.boxes, &whole);
         let mut reached = 0;
-        for (block, (points, out)) in points.chunks(BLOCK).zip(out.chunks_mut(BLOCK)).enumerate() {
-            reached += block_values(path, self, &near, &bounds[block], points, out);
+        for (points, out) in points.chunks(BLOCK).zip(out.chunks_mut(BLOCK)) {
+            reached += block_values(path, self, &near, &bounds_of(path, points), points, out);
         }
         reached
     }
