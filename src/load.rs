@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use engine::cook::{Engine, Settings};
 use engine::files::{RELATIVE_PATHS, is_handed_over, unreadable};
+use engine::graph::fault::code;
 use engine::graph::{Fault, FaultClass, Graph, Part, probe};
 use engine::memory::Ceiling;
 use engine::note::Note;
@@ -73,7 +74,16 @@ pub fn loaded(bytes: &[u8], path: &Path, set: &[Setting]) -> Result<Graph, Vec<F
         path.parent().filter(|_| !is_handed_over(path) && !is_stdin(path)).map_or_else(PathBuf::new, Path::to_owned);
     let set: Vec<(String, String)> = set.iter().map(|Setting(key, json)| (key.clone(), json.clone())).collect();
     let loaded = Graph::load_bytes(bytes, &folder, CATALOGUE, &set, &probe);
-    loaded.map_err(|faults| as_read_from(path, faults))
+    loaded.map_err(|faults| as_read_from(path, naming_features(faults)))
+}
+
+/// The faults with hints that name the feature of node types that this program was built without.
+fn naming_features(mut faults: Vec<Fault>) -> Vec<Fault> {
+    for fault in faults.iter_mut().filter(|fault| fault.code == code::UNKNOWN_TYPE) {
+        let name = fault.fact.split('`').nth(1).unwrap_or_default();
+        fault.hint = crate::left_out(name).or_else(|| fault.hint.take());
+    }
+    faults
 }
 
 /// The faults of the graph at `path` with hints that fit where it was read from: stdin has no folder.

@@ -20,7 +20,7 @@ const FUR: &str = r#"
              "params": { "density": 4000, "length": [0.05, 0.09], "cvs": 8, "lean": 0.3 } },"#;
 
 /// The ball rolls, and the fur with it.
-const MOVING: &str = r#"
+pub(crate) const MOVING: &str = r#"
     "skin": { "type": "Transform", "inputs": { "geometry": "ball" }, "params": {
         "translate": { "keyframes": [[1, [0, 0, 0]], [24, [0.5, 0.2, 0]]] },
         "rotate": { "keyframes": [[1, [0, 0, 0]], [24, [0, 0, -90]]] } } },

@@ -23,7 +23,9 @@ use crate::shared::direction::{GUST_DIR, unit_direction};
 use crate::shared::group::{self, Group};
 use crate::shared::gust_control;
 use curves::clumps::drawn;
-use curves::gusts::{Control, Draw, Gust, GustMasks, Gusts, Influence, Plane, Sphere, evaluate, scale, sideways};
+use curves::gusts::{
+    Control, Draw, Gust, GustMasks, Gusts, Influence, Plane, Sphere, bounds, evaluate, scale, sideways,
+};
 use engine::prelude::*;
 use numerics::ramp::Ramp;
 use numerics::vector::DVec3;
@@ -301,7 +303,7 @@ struct Sent {
 }
 
 fn sent(cx: &FrameCx) -> Sent {
-    let Some(bounds) = cx.part_at_start(CURVES).bounds() else { return Sent::default() };
+    let Some(bounds) = bounds(cx.part_at_start(CURVES).positions()) else { return Sent::default() };
     let ends = |range: Param<Span>| {
         let Span { low, high } = cx.get(range);
         [low, high]

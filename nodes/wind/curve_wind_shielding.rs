@@ -111,6 +111,15 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let amount = cx.get(SHIELD).value;
     let looks = amount > 0.0 || cx.wants(SHIELDED);
     let group = Group::of(&cx.get(GROUP), &curves)?;
+    if !looks && !cx.wants(SHELTER) {
+        cx.publish(SHELTERED, 0.0);
+        cx.publish(RAYS, 0.0);
+        if curves.get(ENVELOPE).is_none() {
+            let ones = vec![1.0; curves.point_count()];
+            curves.set(ENVELOPE, ones)?;
+        }
+        return Ok(OUT.with(curves));
+    }
     let (shielded, cast) = match &group {
         _ if !looks => (vec![0.0; curves.element_count()], 0),
         None => (sheltered(cx, &curves), curves.point_count()),

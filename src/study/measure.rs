@@ -35,8 +35,8 @@ pub(super) fn needs(knobs: &[Knob], graph: &Graph) -> Vec<(String, String, Strin
 }
 
 /// The most cooks that a study takes, for the progress.
-pub(super) fn planned_runs(knobs: &[Knob], repeats: u32) -> usize {
-    1 + search::grid_size(knobs).unwrap_or(search::MOST_RUNS) * repeats as usize
+pub(super) fn planned_runs(knobs: &[Knob], goal: Goal, repeats: u32) -> usize {
+    1 + search::grid_size(knobs, goal).unwrap_or(search::MOST_RUNS) * repeats as usize
 }
 
 /// A study in progress.
@@ -143,7 +143,7 @@ impl<'a> Study<'a> {
         // First, because it gives the floor.
         self.once(&best)?;
         let knobs = self.knobs.clone();
-        if search::grid_size(&knobs).is_some() {
+        if search::grid_size(&knobs, self.goal).is_some() {
             return search::grid(&knobs).iter().try_for_each(|setting| self.once(setting).map(|_| ()));
         }
         let floor = |study: &Self| study.stored.floor.map_or(0.0, |floor| floor.get(study.subject.norm.statistic));
@@ -240,7 +240,7 @@ impl<'a> Study<'a> {
     fn make_finest_reference(&mut self, reason: &str) -> Result<(), Stop> {
         (self.stored.is_beyond, self.stored.floor) = (false, None);
         let best = search::best(&self.knobs);
-        let mut settings = match search::grid_size(&self.knobs) {
+        let mut settings = match search::grid_size(&self.knobs, Goal::None) {
             Some(_) => search::grid(&self.knobs),
             None => vec![best.clone()],
         };

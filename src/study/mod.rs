@@ -178,7 +178,12 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
     }
     fixed.extend(needs.into_iter().map(|(key, value, _)| (key, value)));
     let cancel = cancelled_by_signal();
-    let planned = measure::planned_runs(&knobs, args.repeats.unwrap_or(measure::REPEATS));
+    let goal = match (args.tolerance, args.budget) {
+        (Some(tolerance), _) => Goal::Tolerance(tolerance),
+        (None, Some(Budget(ms))) => Goal::Budget(ms),
+        (None, None) => Goal::None,
+    };
+    let planned = measure::planned_runs(&knobs, goal, args.repeats.unwrap_or(measure::REPEATS));
     let progress = Progress::new((planned * request.frames.len()) as u64, args.quiet);
     let frames = request.frames.iter().map(Frame::to_json).collect();
     let subject = Subject {
@@ -191,11 +196,6 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
         ceiling: memory::ceiling(args.memory),
         cancel,
         progress,
-    };
-    let goal = match (args.tolerance, args.budget) {
-        (Some(tolerance), _) => Goal::Tolerance(tolerance),
-        (None, Some(Budget(ms))) => Goal::Budget(ms),
-        (None, None) => Goal::None,
     };
     subject.check(&knobs)?;
     create_folder(&args.out)?;

@@ -2,14 +2,19 @@
 
 use super::bench::Stop;
 use super::knobs::Knob;
+use super::outcome::Goal;
 
 /// A grid with more settings is searched instead.
 pub(super) const MOST_RUNS: usize = 64;
 
-/// The number of settings of a grid; `None` if it is searched.
-pub(super) fn grid_size(knobs: &[Knob]) -> Option<usize> {
+/// The same where one setting is asked for, which a search finds without the others.
+const MOST_WITH_GOAL: usize = 8;
+
+/// The number of settings of a grid; `None` if it is searched. All values of a single knob are cooked.
+pub(super) fn grid_size(knobs: &[Knob], goal: Goal) -> Option<usize> {
+    let most = if goal == Goal::None || knobs.len() < 2 { MOST_RUNS } else { MOST_WITH_GOAL };
     let product = knobs.iter().try_fold(1_usize, |product, knob| product.checked_mul(knob.values.len()));
-    product.filter(|product| *product <= MOST_RUNS)
+    product.filter(|product| *product <= most)
 }
 
 /// The best value of every knob.
@@ -112,9 +117,12 @@ mod tests {
     fn a_grid_has_every_setting_once_and_the_last_is_the_best() {
         let knobs = knobs(&[2, 3]);
         let grid = grid(&knobs);
-        assert_eq!((grid.len(), grid_size(&knobs)), (6, Some(6)));
+        assert_eq!((grid.len(), grid_size(&knobs, Goal::Tolerance(1.0))), (6, Some(6)));
         assert_eq!((&grid[1], grid.last()), (&vec![0, 1], Some(&best(&knobs))));
-        assert_eq!(grid_size(&self::knobs(&[13, 5])), None);
+        assert_eq!(grid_size(&self::knobs(&[13, 5]), Goal::None), None);
+        assert_eq!(grid_size(&self::knobs(&[3, 3]), Goal::None), Some(9));
+        assert_eq!(grid_size(&self::knobs(&[3, 3]), Goal::Budget(1.0)), None);
+        assert_eq!(grid_size(&self::knobs(&[9]), Goal::Budget(1.0)), Some(9));
     }
 
     #[test]

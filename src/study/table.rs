@@ -30,7 +30,7 @@ pub(super) fn text(outcome: &Outcome) -> String {
     );
     if outcome.knobs.len() > 1 {
         let settings = outcome.knobs.iter().fold(1_usize, |product, knob| product.saturating_mul(knob.values.len()));
-        let _ = match search::grid_size(&outcome.knobs) {
+        let _ = match search::grid_size(&outcome.knobs, outcome.goal) {
             Some(size) => writeln!(text, "a grid of {size} settings"),
             None => writeln!(text, "a search: {} of {settings} settings were cooked", outcome.runs.len()),
         };

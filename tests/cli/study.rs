@@ -298,6 +298,34 @@ fn several_knobs_make_a_grid_and_a_large_one_is_searched() {
     assert!((17..64).contains(&runs) && searched["pick"].is_number(), "{runs} runs");
     let args = ["study", "g.json", "--knob", &a, "--knob", b, "--frames", "1", "--repeats", "1", "--quiet", "--fresh"];
     assert!(bench.done(&args).contains("a search: 17 of 65 settings were cooked"));
+    // With a tolerance that only the best steps meet, a small grid is searched, too: its two lines alone.
+    let steps = study(&bench, &["--knob", STEPS, "--knob", "bent.gap=1e-4"]);
+    let error = |run: usize| steps["runs"][run]["error"]["mean"].as_f64().unwrap();
+    let between = (error(2) * error(3)).sqrt().to_string();
+    let found = study(&bench, &["--knob", STEPS, "--knob", "bent.gap=5e-4,3e-4,1e-4", "--tolerance", &between]);
+    assert_eq!(found["runs"].as_array().unwrap().len(), 6, "{found}");
+}
+
+/// The order of the errors e of curves with 2, 4 and 8 segments, against one of 32: e = C·|h² − 32⁻²|.
+#[test]
+fn the_error_of_curves_with_few_cvs_falls_with_the_square_of_their_segments() {
+    let grass = r#"{ "convect": 1, "scene": { "frames": [1, 4] }, "nodes": {
+        "ground": { "type": "Mesh_Primitive", "params": { "shape": "grid", "size": [0.4, 0, 0.4], "divisions": 1 } },
+        "blades": { "type": "Curve_Scatter", "inputs": { "skin": "ground" },
+                    "params": { "density": 200, "lean": 0, "length": [0.2, 0.3] } },
+        "wind": { "type": "Curve_Wind", "inputs": { "curves": "blades" }, "params": { "mode": "resolution_free",
+                  "wind_dir": [1, 0.1, 0.3], "global_rotate": { "expr": "0.3 + 0.02*frame" }, "noise": "none" } } },
+        "outputs": { "grass": "wind" } }"#;
+    let bench = Bench::with_graph(grass);
+    let found = study(&bench, &["--knob", "blades.cvs=3,5,9,17", "--norm", "surface"]);
+    assert_eq!(found["reference"]["settings"]["blades.cvs"], json!(33));
+    let error = |run: usize| found["runs"][run]["error"]["mean"].as_f64().unwrap();
+    for (run, segments) in [(0, 2.0_f64), (1, 4.0)] {
+        let of = |segments: f64, order: f64| libm::pow(segments, -order) - libm::pow(32.0, -order);
+        let ratio = error(run) / error(run + 1);
+        let expected = [1.8, 2.2].map(|order| of(segments, order) / of(2.0 * segments, order));
+        assert!(expected[0] < ratio && ratio < expected[1], "{ratio} {expected:?}");
+    }
 }
 
 #[test]

@@ -39,7 +39,7 @@ fn bounds_body(points: &[Vec3]) -> Bounds {
 }
 
 /// The union with other bounds.
-pub(super) fn join([low, high]: Bounds, [other_low, other_high]: Bounds) -> Bounds {
+fn join([low, high]: Bounds, [other_low, other_high]: Bounds) -> Bounds {
     [[0, 1, 2].map(|k| low[k].min(other_low[k])), [0, 1, 2].map(|k| high[k].max(other_high[k]))]
 }
 

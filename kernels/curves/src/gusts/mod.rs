@@ -21,7 +21,7 @@ mod shear;
 
 use block::block_values;
 pub use control::{AXIS_ROWS, Control, ControlShape, outline};
-use cull::{Bounds, Boxes, NOWHERE, bounds_of, join, meeting};
+use cull::{Boxes, bounds_of, meeting};
 pub use draw::{Draw, Gust, Living, MOST_LIVING};
 pub use launch::Plane;
 use numerics::parallel;
@@ -107,6 +107,11 @@ const LUMPS: f32 = 1.5;
 /// Fraction by which bounds are enlarged for culling: more than all rounding errors together.
 const MARGIN: f64 = 1e-4;
 
+/// The least and largest coordinates of points; `None` without points.
+pub fn bounds(points: &[[f32; 3]]) -> Option<[[f32; 3]; 2]> {
+    (!points.is_empty()).then(|| bounds_of(Path::chosen(), points))
+}
+
 /// The value of each point.
 ///
 /// # Panics
@@ -173,24 +178,22 @@ impl<'a> Prepared<'a> {
         Self { gusts, falloff: Profile::new(gusts.falloff), ramps, boxes, only_adds }
     }
 
-    /// The bounds of a task's blocks of points, and the regions that may reach any of them.
-    fn near(&self, path: Path, points: &[[f32; 3]]) -> ([Bounds; TASK / BLOCK], Boxes) {
-        let mut bounds = [NOWHERE; TASK / BLOCK];
-        let mut whole = NOWHERE;
-        for (points, bounds) in points.chunks(BLOCK).zip(&mut bounds) {
-            *bounds = bounds_of(path, points);
-            whole = join(whole, *bounds);
-        }
-        (bounds, meeting(path, &self.boxes, &whole))
+    /// The regions that may reach any of a task's points.
+    fn near(&self, path: Path, points: &[[f32; 3]]) -> Boxes {
+        meeting(path, &self.boxes, &bounds_of(path, points))
     }
 
     /// Adds to the values of a task's points, which are their `base`; returns how many of them any influence reaches.
     fn task(&self, path: Path, points: &[[f32; 3]], factors: Option<&[f32]>, out: &mut [f32]) -> usize {
-        let (bounds, near) = self.near(path, points);
+        // Of most tasks no gust is near: then blocks need no bounds of their own.
+        let near = self.near(path, points);
+        if near.len() == 0 {
+            return 0;
+        }
         let mut reached = 0;
         for (block, (points, out)) in points.chunks(BLOCK).zip(out.chunks_mut(BLOCK)).enumerate() {
             let factors = factors.map(|factors| &factors[block * BLOCK..]);
-            reached += block_values(path, self, &near, &bounds[block], points, factors, out);
+            reached += block_values(path, self, &near, &bounds_of(path, points), points, factors, out);
         }
         reached
     }

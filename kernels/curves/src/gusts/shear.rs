@@ -1,7 +1,7 @@
 //! The direction that gusts add to the wind: each blows to its own side.
 
 use super::block::{Ball, ROWS, load, scale_of, scales};
-use super::cull::{Bounds, Boxes};
+use super::cull::{Bounds, Boxes, bounds_of};
 use super::{BLOCK, Gusts, Prepared, TASK};
 use numerics::lanes::{F32x16, LANES};
 use numerics::parallel;
@@ -27,10 +27,13 @@ pub fn sideways_on(path: Path, points: &[Vec3], gusts: &Gusts<'_>, sides: &[Vec3
     let mut out = vec![[0.0; 3]; points.len()];
     let tasks = out.chunks_mut(TASK).zip(points.chunks(TASK));
     parallel::for_each(tasks, |task, (out, points)| {
-        let (bounds, near) = prepared.near(path, points);
+        let near = prepared.near(path, points);
+        if near.len() == 0 {
+            return;
+        }
         for (block, (points, out)) in points.chunks(BLOCK).zip(out.chunks_mut(BLOCK)).enumerate() {
             let factors = gusts.masks.from(task * TASK + block * BLOCK).strength;
-            block_sideways(path, &prepared, (&near, &bounds[block]), points, factors, sides, out);
+            block_sideways(path, &prepared, (&near, &bounds_of(path, points)), points, factors, sides, out);
         }
     });
     out

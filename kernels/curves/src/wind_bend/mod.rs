@@ -119,6 +119,13 @@ pub fn bend(starts: &[u32], points: &[[f32; 3]], bend: &Bend<'_>) -> Bent {
     bend_on(Path::chosen(), starts, points, bend)
 }
 
+/// Whether an envelope is 1 everywhere, as a node leaves it that has no effect: then it need not be gathered.
+fn is_full(envelope: &[f32]) -> bool {
+    /// Values compared at once, without a branch between them.
+    const BLOCK: usize = 64;
+    envelope.chunks(BLOCK).all(|block| block.iter().fold(true, |full, x| full & (*x == 1.0)))
+}
+
 /// [`bend()`] on a given SIMD path.
 ///
 /// # Panics
@@ -127,6 +134,7 @@ pub fn bend_on(path: Path, starts: &[u32], points: &[[f32; 3]], bend: &Bend<'_>)
     if bend.rotate.value == 0.0 || bend.blend.value <= 0.0 || bend.ramp.is_constant() == Some(0.0) {
         return Bent { points: points.to_vec(), max_angle: 0.0, length_error: 0.0 };
     }
+    let bend = &Bend { envelope: bend.envelope.filter(|envelope| !is_full(envelope)), ..bend.clone() };
     let mut out = vec![[0.0; 3]; points.len()];
     let reached = parallel::map(tasks(starts, &mut out), |_, task| {
         let mut scratch = Scratch::default();
