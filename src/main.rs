@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use convect::failure::{Exit, Failure, too_large_files_are_errors};
 use convect::say;
-use convect::{check, completions, convert, cook, diff, explain, functions, nodes, schema, stats, study};
+use convect::{check, completions, convert, cook, diff, explain, functions, job, merge, nodes, schema, stats, study};
 
 /// Keeps the pages of large arrays between frames. The system's allocator returns them at once, and requesting them
 /// again costs a third of the time of a frame of a million curves.
@@ -33,6 +33,10 @@ enum Verb {
     Study(Box<study::StudyArgs>),
     /// Convert geometry files from one format to another
     Convert(convert::ConvertArgs),
+    /// Cut a cook into tasks for Open Job Description, Slurm, or anything that runs commands
+    Job(job::JobArgs),
+    /// Join the parts of a job into whole outputs
+    Merge(merge::MergeArgs),
     /// Print the reference of the expression language: names, operators, functions
     Functions,
     /// Print the JSON Schema of graph files, for editors
@@ -82,6 +86,8 @@ fn run(verb: &Verb) -> Result<(), Failure> {
         Verb::Diff(args) => diff::run(args),
         Verb::Study(args) => study::run(args),
         Verb::Convert(args) => convert::run(args),
+        Verb::Job(args) => job::run(args),
+        Verb::Merge(args) => merge::run(args),
         Verb::Functions => functions::run(),
         Verb::Schema => schema::run(),
         Verb::Completions(args) => completions::run::<Verb>(args),

@@ -38,6 +38,7 @@ TYPES = {
     "faceVertexIndices": "int[]",
     "tetVertexIndices": "int4[]",
     "surfaceFaceVertexIndices": "int3[]",
+    "primvars:displayColor": "color3f[]",
 }
 
 
@@ -160,7 +161,15 @@ def check_prim(prim, kind, parts, times, lossy_nan):
             wanted.setdefault(key, [None] * len(parts))[place] = values
     found = {}
     for name, attribute in attributes.items():
-        if name not in TOKENS[kind]:
+        if name == "primvars:st":
+            uvw = attributes["primvars:uvw"]
+            for time in times or [0]:
+                st, of = attribute.Get(time), uvw.Get(time)
+                if (st is None) != (of is None) or st and [tuple(row)[:2] for row in of] != [tuple(row) for row in st]:
+                    yield f"{where}.primvars:st at {time} is not the first two of uvw"
+            if attribute.GetTypeName() != "texCoord2f[]":
+                yield f"{where}.primvars:st is {attribute.GetTypeName()}, expected texCoord2f[]"
+        elif name not in TOKENS[kind]:
             found[source_of(kind, attribute)] = attribute
     derived = {("extent", None)} | ({("surfaceFaceVertexIndices", None)} if kind == "tets" else set())
     missing, surplus = (set(wanted) | derived) - set(found), set(found) - set(wanted) - derived
@@ -270,6 +279,8 @@ def type_of(name, values):
     number = row[0] if isinstance(row, list) else row
     if isinstance(number, int):
         return {1: "int[]", 3: "int3[]", 4: "int4[]"}[width]
+    if name == "Cd" and width == 3:
+        return "color3f[]"
     named = {"Pref": "point3f[]", "P": "point3f[]", "v": "vector3f[]", "N": "normal3f[]", "orient": "quatf[]"}
     return named.get(name) or {1: "float[]", 3: "float3[]", 4: "color4f[]"}[width]
 

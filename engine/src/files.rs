@@ -348,8 +348,9 @@ mod tests {
         let [b, c] = ["b", "c"].map(|name| file.folder().open(name).unwrap());
         let key = |others: &[File]| file.clone().read_with(others).key();
         assert_eq!(key(&[]), file.key());
-        assert!(key(&[b.clone()]) != key(&[c.clone()]) && key(&[b]) != file.key());
-        assert_eq!(&*file.clone().read_with(&[c]).bytes().unwrap(), b"1");
+        let (b, c) = (std::slice::from_ref(&b), std::slice::from_ref(&c));
+        assert!(key(b) != key(c) && key(b) != file.key());
+        assert_eq!(&*file.clone().read_with(c).bytes().unwrap(), b"1");
         assert!(file.folder().open("none").is_err());
     }
 

@@ -120,6 +120,9 @@ fn odd_floats(count: usize) -> Vec<f32> {
 
 /// Adds animated and static attributes of every type.
 fn add_attributes(part: &mut Component, frame: u32) -> Outcome {
+    let points = part.point_count();
+    part.set_column(Owner::Point, "uvw", Column::new(vectors::<3>(points, 777, frame)))?;
+    part.set_column(Owner::Point, "Cd", Column::new(vectors::<3>(points, 778, 0)))?;
     for owner in Owner::ALL {
         let rows = part.table(owner).rows();
         let salt = owner as u32 * 100;

@@ -12,6 +12,7 @@ mod convert;
 mod cook;
 mod diff;
 mod exits;
+mod job;
 mod messages;
 mod notes;
 mod pictures;

@@ -2,7 +2,7 @@
 //! schema, validation and conformance tests are derived from it.
 
 use super::code::Code;
-use super::spec::{Bounds, Facts, ParamSpec, Shape, Unset};
+use super::spec::{Bounds, Companions, Facts, ParamSpec, Shape, Unset};
 use super::unit::Unit;
 use super::value::{Maskable, Seed, Span, Turn, Value};
 use super::{Params, choice::Choice};
@@ -140,7 +140,7 @@ impl<T: ParamType> Param<T> {
     }
 
     /// The param is a file that is read with others, which depend on the value of the node's param `frame`.
-    pub const fn read_with(mut self, companions: fn(&File, f64) -> crate::Result<Vec<File>>) -> Self {
+    pub const fn read_with(mut self, companions: Companions) -> Self {
         self.facts.companions = Some(companions);
         self
     }

@@ -23,7 +23,7 @@ pub(crate) use controls::ControlValue;
 pub use handle::{Param, ParamDecl, ParamType, RampDefault};
 pub(crate) use source::mixed_seed;
 pub use source::{Clock, CodeSource, Keyframe, Keyframes, Source};
-pub use spec::{Bounds, Facts, ParamSpec, Shape, Unset};
+pub use spec::{Bounds, Companions, Facts, ParamSpec, Shape, Unset};
 pub use turn::euler_to_turn;
 pub use unit::Unit;
 pub use value::{Maskable, Seed, Span, Turn, Value};

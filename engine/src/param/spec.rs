@@ -125,6 +125,9 @@ impl std::fmt::Display for Bounds {
     }
 }
 
+/// Finds the files that a file is read with at a frame.
+pub type Companions = fn(&File, f64) -> crate::Result<Vec<File>>;
+
 /// What a handle declares in addition to name, default and help.
 #[derive(Clone, Copy, Debug)]
 pub struct Facts {
@@ -147,7 +150,7 @@ pub struct Facts {
     /// Of a param that selects a time of a file: whether the file has several, given all params with their files.
     pub timed: Option<fn(&Params) -> bool>,
     /// Of a file: the other files that it is read with at a frame.
-    pub companions: Option<fn(&File, f64) -> crate::Result<Vec<File>>>,
+    pub companions: Option<Companions>,
 }
 
 /// The value of a param that the graph does not set.

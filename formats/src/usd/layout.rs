@@ -6,6 +6,8 @@
 //! | `width` per point | `widths` on curves and points; curves without it get [`DEFAULT_WIDTH`] |
 //! | `id` per point | `ids` (int64) on points |
 //! | `id` of curves | `primvars:curve_id`: curves have no `ids`, and Blender drops a primvar called `id` there |
+//! | `Cd` of three floats | `primvars:displayColor`, a `color3f[]`, which viewers show |
+//! | `uvw` per point | `primvars:uvw`, and its first two floats as `primvars:st`, a `texCoord2f[]`, which renderers look for |
 //! | any other NAME | `primvars:NAME`; `vertex` per point, `uniform` per element, `constant` once |
 //! | topology | counts and indices; for tets also their surface |
 //!
@@ -14,7 +16,9 @@
 //! read it, and USD interpolates it as a rotation. Any other four floats are a `color4f[]`, which Blender reads, while
 //! it warns about `float4[]`. `Pref` is a `point3f[]`.
 
-use engine::geometry::{Column, ColumnType, Component, ID, Kind, N, Name, ORIENT, Owner, P, PREF, Topology, V, WIDTH};
+use engine::geometry::{
+    Column, ColumnType, Component, ID, Kind, N, Name, ORIENT, Owner, P, PREF, Topology, UVW, V, WIDTH,
+};
 
 use super::extent::{EMPTY, extent};
 use super::stage::{Interpolation, UsdType};
@@ -23,6 +27,12 @@ use super::surface::surface;
 /// Width of curves that have none, metres. USD has no default, and readers take 1 m.
 pub const DEFAULT_WIDTH: f32 = 0.001;
 
+/// Colour, three floats.
+const CD: &str = "Cd";
+
+/// The primvar in which renderers look for texture coordinates.
+const TEX_COORDS: &str = "st";
+
 /// The source of an attribute's values. The order of the variants is that in files.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Source {
@@ -30,6 +40,8 @@ pub(super) enum Source {
     Topology(TopologyArray),
     /// The box around the points.
     Extent,
+    /// The first two floats of `uvw` per point. It comes before attributes, so that its name is not taken.
+    TexCoords,
     /// An attribute of the geometry.
     Attribute(Owner, Name),
     /// [`DEFAULT_WIDTH`], if no frame has widths.
@@ -90,6 +102,10 @@ pub(super) fn declare(kind: Kind, source: &Source, rows: ColumnType) -> Declarat
             let interpolation = Some(Interpolation::Constant);
             return Declaration { interpolation, ..schema("widths", UsdType::Float) };
         }
+        Source::TexCoords => {
+            let target = TargetName::Primvar { name: TEX_COORDS, own: TEX_COORDS };
+            return Declaration { target, kind: UsdType::TexCoord2, interpolation: Some(Interpolation::Vertex) };
+        }
         Source::Attribute(owner, name) => (*owner, &**name),
     };
     let interpolation = Some(match owner {
@@ -111,10 +127,12 @@ pub(super) fn declare(kind: Kind, source: &Source, rows: ColumnType) -> Declarat
             _ => {}
         }
     }
-    let target = TargetName::Primvar {
-        name: if kind == Kind::Curves && name == ID.name { "curve_id" } else { name },
-        own: name,
+    let named = match name {
+        CD if rows == ColumnType::F3 => "displayColor",
+        name if kind == Kind::Curves && name == ID.name => "curve_id",
+        name => name,
     };
+    let target = TargetName::Primvar { name: named, own: name };
     Declaration { target, kind: primvar_type(name, rows), interpolation }
 }
 
@@ -124,6 +142,7 @@ fn primvar_type(name: &str, rows: ColumnType) -> UsdType {
         ColumnType::F3 if name == P.name || name == PREF.name => UsdType::Point3,
         ColumnType::F3 if name == V.name => UsdType::Vector3,
         ColumnType::F3 if name == N.name => UsdType::Normal3,
+        ColumnType::F3 if name == CD => UsdType::Color3,
         ColumnType::F3 => UsdType::Float3,
         ColumnType::F4 if name == ORIENT.name => UsdType::Quat,
         ColumnType::F4 => UsdType::Color4,
@@ -149,7 +168,7 @@ pub(super) fn absent(kind: Kind, source: &Source, rows: ColumnType, points: Opti
         }
         (Source::Attribute(Owner::Once, _) | Source::DefaultWidth, _) | (_, Some(_)) => None,
         (Source::Extent, None) => Some(Column::new(EMPTY.to_vec())),
-        (Source::Topology(_) | Source::Attribute(..), None) => Some(Column::zeros(rows, 0)),
+        (Source::Topology(_) | Source::Attribute(..) | Source::TexCoords, None) => Some(Column::zeros(rows, 0)),
     }
 }
 
@@ -167,6 +186,8 @@ impl Derived {
         arrays.push((Source::Extent, self.extent(component)));
         let owned = component.columns().map(|(owner, name, column)| (attribute(owner, name), column.clone()));
         arrays.extend(owned);
+        let coordinates = component.table(Owner::Point).column(UVW.name);
+        arrays.extend(coordinates.map(|column| (Source::TexCoords, column.clone())));
         arrays
     }
 
@@ -268,6 +289,9 @@ mod tests {
             (Owner::Point, "uvw", F3, "float3[] primvars:uvw vertex"),
             (Owner::Point, "Pref", F3, "point3f[] primvars:Pref vertex"),
             (Owner::Point, "orient", F4, "quatf[] primvars:orient vertex"),
+            (Owner::Point, "Cd", F3, "color3f[] primvars:displayColor vertex"),
+            (Owner::Element, "Cd", F3, "color3f[] primvars:displayColor uniform"),
+            (Owner::Point, "Cd", F4, "color4f[] primvars:Cd vertex"),
             (Owner::Point, "tint", F4, "color4f[] primvars:tint vertex"),
             (Owner::Point, "face", I3, "int3[] primvars:face vertex"),
             (Owner::Point, "tet", I4, "int4[] primvars:tet vertex"),

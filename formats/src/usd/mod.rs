@@ -43,7 +43,7 @@ use recorder::{Header, Recorder};
 use stage::Encoder;
 
 pub use layout::DEFAULT_WIDTH;
-pub use read::{NoAssets, UsdAssets, UsdReading, UsdStage};
+pub use read::{ClipPiece, NoAssets, UsdAssets, UsdReading, UsdStage};
 
 /// The two file formats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

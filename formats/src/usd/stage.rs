@@ -125,7 +125,10 @@ pub(super) enum UsdType {
     Point3,
     Vector3,
     Normal3,
+    Color3,
     Color4,
+    /// Of rows of three floats the first two.
+    TexCoord2,
     /// Imaginary part first in memory, as in our rows; real part first in text.
     Quat,
     Int,
@@ -143,7 +146,9 @@ impl UsdType {
             Self::Point3 => "point3f[]",
             Self::Vector3 => "vector3f[]",
             Self::Normal3 => "normal3f[]",
+            Self::Color3 => "color3f[]",
             Self::Color4 => "color4f[]",
+            Self::TexCoord2 => "texCoord2f[]",
             Self::Quat => "quatf[]",
             Self::Int => "int[]",
             Self::Int3 => "int3[]",

@@ -168,6 +168,9 @@ fn put_array(out: &mut impl Write, kind: UsdType, rows: &Column) -> io::Result<u
             // In text the real part comes first.
             put_rows(out, floats.as_chunks().0.iter().map(|&[x, y, z, w]| [w, x, y, z]), put_float)
         }
+        Numbers::Floats(floats) if kind == UsdType::TexCoord2 => {
+            put_rows(out, floats.as_chunks().0.iter().map(|&[s, t, _]| [s, t]), put_float)
+        }
         Numbers::Floats(floats) => put_rows(out, floats.chunks_exact(width), put_float),
         Numbers::Ints(ints) => {
             let mut buffer = itoa::Buffer::new();

@@ -31,6 +31,7 @@ mod id {
     pub(super) const TOKEN: u64 = 11;
     pub(super) const QUATF: u64 = 17;
     pub(super) const DOUBLE3: u64 = 23;
+    pub(super) const FLOAT2: u64 = 20;
     pub(super) const FLOAT3: u64 = 24;
     pub(super) const INT3: u64 = 26;
     pub(super) const FLOAT4: u64 = 28;
@@ -165,6 +166,15 @@ impl<W: Write> Writer<W> {
                 self.put_numbers(values, |x| i64::from(x).to_le_bytes())?;
             }
             Numbers::Ints(values) => self.put_numbers(values, i32::to_le_bytes)?,
+            Numbers::Floats(values) if kind == UsdType::TexCoord2 => {
+                let (rows, _) = values.as_chunks::<3>();
+                self.put_numbers(rows, |[s, t, _]| {
+                    let mut bytes = [0; 8];
+                    bytes[..4].copy_from_slice(&s.to_le_bytes());
+                    bytes[4..].copy_from_slice(&t.to_le_bytes());
+                    bytes
+                })?;
+            }
             Numbers::Floats(values) => self.put_numbers(values, f32::to_le_bytes)?,
         }
         Ok(array | at)
@@ -308,7 +318,8 @@ fn rep(id: u64) -> u64 {
 fn array_id(kind: UsdType) -> u64 {
     match kind {
         UsdType::Float => id::FLOAT,
-        UsdType::Float3 | UsdType::Point3 | UsdType::Vector3 | UsdType::Normal3 => id::FLOAT3,
+        UsdType::Float3 | UsdType::Point3 | UsdType::Vector3 | UsdType::Normal3 | UsdType::Color3 => id::FLOAT3,
+        UsdType::TexCoord2 => id::FLOAT2,
         UsdType::Color4 => id::FLOAT4,
         UsdType::Quat => id::QUATF,
         UsdType::Int => id::INT,
@@ -347,6 +358,9 @@ mod tests {
         let (rep, bytes) = stored(UsdType::Int64, Column::new(vec![-2]));
         assert_eq!(rep, 0x8005_0000_0000_0058);
         assert_eq!(bytes[8..], [0xfe, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff]);
+        let (rep, bytes) = stored(UsdType::TexCoord2, Column::new(vec![[1.0, 2.0, 9.0_f32], [-0.0, 0.0, 9.0]]));
+        assert_eq!((rep, bytes[0], bytes.len()), (0x8014_0000_0000_0058, 2, 24));
+        assert_eq!(bytes[8..], [0, 0, 0x80, 0x3f, 0, 0, 0, 0x40, 0, 0, 0, 0x80, 0, 0, 0, 0]);
         let (rep, bytes) = stored(UsdType::Quat, Column::new(Vec::<[f32; 4]>::new()));
         assert_eq!((rep, bytes.len()), (0x8011_0000_0000_0000, 0), "an empty array has no offset");
     }

@@ -25,6 +25,7 @@ mod lerp;
 mod matrix;
 mod order;
 mod parts;
+mod pieces;
 mod primvars;
 mod sample;
 mod stage;
@@ -39,6 +40,7 @@ use engine::geometry::Geometry;
 
 use crate::{FormatError, Result};
 
+pub use pieces::ClipPiece;
 pub use stage::UsdStage;
 
 /// Opens the files that a stage names.

@@ -383,7 +383,7 @@ fn set_attribute(
         Ok(made) => made,
         Err(why) => return Ok(Err(why)),
     };
-    let spreads = owner == Owner::Once && OF_POINTS.contains(&&*found.attribute);
+    let spreads = owner == Owner::Once && !found.is_ours && OF_POINTS.contains(&&*found.attribute);
     let (owner, column) =
         if spreads { (Owner::Point, repeated(&column, component.point_count())) } else { (owner, column) };
     let set = component.set_column(owner, found.name.as_str(), column);

@@ -212,6 +212,8 @@ pub(super) struct Found {
     pub(super) name: String,
     /// The role of its numbers.
     pub(super) role: Role,
+    /// Whether convect wrote it under another name: then it has the owner that it had.
+    pub(super) is_ours: bool,
 }
 
 /// How numbers follow the place of the prim.
@@ -237,47 +239,61 @@ impl UsdStage {
         let has = |name: &str| names.binary_search(&name).is_ok();
         let mut found = Vec::new();
         for attribute in &names {
+            let own = self.own_name(prim, attribute)?;
+            let is_ours = own.is_some();
             let (name, role) = match *attribute {
                 "velocities" => ("v".to_owned(), Role::Vector),
                 "normals" if has("primvars:normals") => continue,
                 "normals" | "primvars:normals" => ("N".to_owned(), Role::Normal),
                 "widths" if kind == Kind::Curves || kind == Kind::Points => ("width".to_owned(), Role::Length),
                 "ids" if kind == Kind::Points => ("id".to_owned(), Role::None),
-                "primvars:displayColor" if !has("primvars:Cd") => ("Cd".to_owned(), Role::None),
+                "primvars:displayColor" if is_ours || !has("primvars:Cd") => ("Cd".to_owned(), Role::None),
                 "primvars:st" if !has("primvars:uvw") => ("uvw".to_owned(), Role::None),
                 "primvars:st" | "primvars:displayColor" => continue,
                 other => match other.strip_prefix("primvars:") {
-                    Some(rest) if !rest.ends_with(":indices") => self.primvar(prim, other, rest)?,
+                    Some(rest) if !rest.ends_with(":indices") => {
+                        let name = own.unwrap_or_else(|| rest.to_owned());
+                        let role = self.role(prim, other, &name)?;
+                        (name, role)
+                    }
                     _ => continue,
                 },
             };
-            found.push(Found { attribute: (*attribute).to_owned(), name, role });
+            found.push(Found { attribute: (*attribute).to_owned(), name, role, is_ours });
         }
         Ok(found)
     }
 
-    /// Name and role of a primvar.
-    fn primvar(&self, prim: &Prim, attribute: &str, rest: &str) -> Result<(String, Role)> {
+    /// The name of an attribute of convect: it writes what is no identifier, or has another name in USD, as `displayName`.
+    /// Others write labels there.
+    fn own_name(&self, prim: &Prim, attribute: &str) -> Result<Option<String>> {
+        let Some(rest) = attribute.strip_prefix("primvars:") else { return Ok(None) };
         let own = self.metadata(prim, attribute, "displayName")?;
-        // convect writes the name of an attribute that is no identifier as `displayName`; others write labels there.
         let is_ours = |name: &&str| {
+            let alias = match *name {
+                "id" => "curve_id",
+                "Cd" => "displayColor",
+                _ => "",
+            };
             let made = identifier(name);
-            rest == made
-                || (*name == "id" && rest == "curve_id")
-                || rest
-                    .strip_prefix(&*made)
-                    .is_some_and(|number| number.strip_prefix('_').is_some_and(|number| number.parse::<u64>().is_ok()))
+            let stems = [&*made, alias].into_iter().filter(|stem| !stem.is_empty());
+            stems.into_iter().filter_map(|stem| rest.strip_prefix(stem)).any(|after| {
+                after.is_empty() || after.strip_prefix('_').is_some_and(|number| number.parse::<u64>().is_ok())
+            })
         };
-        let name = own.as_ref().and_then(Value::text).filter(is_ours).unwrap_or(rest).to_owned();
+        Ok(own.as_ref().and_then(Value::text).filter(is_ours).map(str::to_owned))
+    }
+
+    /// The role of a primvar.
+    fn role(&self, prim: &Prim, attribute: &str, name: &str) -> Result<Role> {
         let kind = self.metadata(prim, attribute, "typeName")?;
-        let role = match kind.as_ref().and_then(Value::text).unwrap_or_default() {
+        Ok(match kind.as_ref().and_then(Value::text).unwrap_or_default() {
             kind if kind.starts_with("point3") => Role::Point,
             kind if kind.starts_with("vector3") => Role::Vector,
             kind if kind.starts_with("normal3") => Role::Normal,
             _ if name == "width" || name == "thickness" => Role::Length,
             _ => Role::None,
-        };
-        Ok((name, role))
+        })
     }
 
     /// The rows of an attribute at a time, its indices resolved, and its interpolation; an inner error says why it is

@@ -1,0 +1,193 @@
+//! `job` and `merge`: a cook in parts is the cook of the whole.
+
+use std::fs;
+use std::process::Command;
+
+use serde_json::{Value, json};
+
+use crate::bench::Bench;
+
+/// Grass that swings, grass at rest, and a drop of dough that falls.
+const SCENE: &str = r#"{
+  "convect": 1,
+  "scene": { "frames": [1, 9], "fps": 24, "origin": [1000.25, 0, 0] },
+  "nodes": {
+    "blades": { "type": "Curve_In", "params": { "file": "grass.obj" } },
+    "wind": { "type": "Curve_Wind", "inputs": { "curves": "blades" }, "params": { "global_rotate": { "keyframes": [[1, 0], [4, 0.6]] }, "scroll": 0, "noise": "none" } },
+    "box": { "type": "Mesh_Primitive", "params": { "divisions": 1 } },
+    "tets": { "type": "Tetrahedralize", "inputs": { "surface": "box" } },
+    "fall": { "type": "Softbody", "inputs": { "bodies": "tets" } }
+  },
+  "outputs": { "grass": "wind", "still": "blades", "dough": "fall" }
+}"#;
+
+/// Runs a line of a list, with this program.
+fn run(bench: &Bench, line: &str) {
+    let rest = line.strip_prefix("convect ").unwrap();
+    let words: Vec<&str> = rest.split(' ').map(|word| word.trim_matches('\'')).collect();
+    bench.done(&words);
+}
+
+#[test]
+fn the_parts_of_a_list_merge_to_the_whole() {
+    let bench = Bench::with_graph(SCENE);
+    bench.done(&["cook", "g.json", "--out", "whole"]);
+    bench.done(&["job", "g.json", "--engine", "list", "--out", "farm", "--chunk", "4"]);
+    let list = fs::read_to_string(bench.path("farm/g.list.txt")).unwrap();
+    let lines: Vec<&str> = list.lines().collect();
+    // The dough, what stands still, three parts of the grass, and the merge.
+    assert_eq!(lines.len(), 6, "{list}");
+    assert_eq!(
+        lines[2],
+        "convect cook g.json --part 1-4 --output grass --out farm/parts/1-4 --cache farm/cache --report \
+         farm/parts/1-4/report.frames.json --quiet"
+    );
+    // From frame 4 on the grass does not move, so that its last part has no reason to sample.
+    lines[..5].iter().for_each(|line| run(&bench, line));
+    run(&bench, lines[5]);
+    for name in ["grass", "dough", "still"] {
+        let [whole, merged] = [format!("whole/{name}.usdc"), format!("farm/{name}.usda")];
+        assert_eq!(bench.done(&["diff", &whole, &merged]), "the same\n", "{name}");
+    }
+    assert_eq!(bench.read_json("farm/report.json")["frames"], json!([1, 2, 3, 4, 5, 6, 7, 8, 9]));
+    bench.done(&["merge", "farm", "--one-file", "--output", "grass"]);
+    assert_eq!(bench.done(&["diff", "whole/grass.usdc", "farm/grass.usdc"]), "the same\n");
+    // Between frames of two parts.
+    bench.write(
+        "read.json",
+        r#"{"convect": 1, "scene": {"frames": [1, 9]}, "nodes": {
+            "a": {"type": "Usd_In", "params": {"file": "whole/grass.usdc"}},
+            "b": {"type": "Usd_In", "params": {"file": "farm/grass.usda"}}
+        }, "outputs": {"a": "a", "b": "b"}}"#,
+    );
+    bench.done(&["cook", "read.json", "--frames", "4.5,3.25", "--format", "json", "--out", "half"]);
+    for frame in ["0004_5", "0003_25"] {
+        let [a, b] = ["a", "b"].map(|name| format!("half/{name}.{frame}.json"));
+        assert_eq!(bench.done(&["diff", &a, &b]), "the same\n");
+    }
+}
+
+#[test]
+fn a_merge_demands_every_frame_once() {
+    let bench = Bench::new();
+    let part = |part: &str| {
+        let folder = format!("farm/parts/{part}");
+        bench.done(&["cook", "g.json", "--part", part, "--out", &folder, "--report", &format!("{folder}/report.json")]);
+    };
+    part("1-2");
+    let ran = bench.run(&["merge", "farm", "--frames", "1-4"]);
+    let expected = "output `grass` lacks frames 3-4; cook the parts that have them again\n";
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), expected));
+    part("2-4");
+    let ran = bench.run(&["merge", "farm", "--frames", "1-4"]);
+    let expected = "output `grass`: frame 2 is in two parts; remove one of them\n";
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), expected));
+    fs::remove_dir_all(bench.path("farm/parts/2-4")).unwrap();
+    bench.done(&[
+        "cook",
+        "g.json",
+        "--frames",
+        "3-4",
+        "--set",
+        "wind.blend=0",
+        "--out",
+        "farm/parts/3-4",
+        "--report",
+        "farm/parts/3-4/report.json",
+    ]);
+    let ran = bench.run(&["merge", "farm"]);
+    assert_eq!(ran.code, Some(1));
+    assert!(
+        ran.stderr.contains("do not fit together") && ran.stderr.contains("has samples in only one of them"),
+        "{}",
+        ran.stderr
+    );
+    let ran = bench.run(&["merge", "farm", "--output", "fur"]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(2), "no part has an output `fur`; outputs: `grass`, `still`\n"));
+}
+
+#[test]
+fn files_of_frames_merge_too() {
+    let bench = Bench::new();
+    bench.done(&["cook", "g.json", "--format", "json", "--out", "whole"]);
+    for part in ["1-2", "3-4"] {
+        let folder = format!("farm/parts/{part}");
+        let report = format!("{folder}/report.json");
+        bench.done(&["cook", "g.json", "--part", part, "--format", "json", "--out", &folder, "--report", &report]);
+    }
+    bench.done(&["merge", "farm", "--frames", "1-4"]);
+    assert_eq!(bench.done(&["diff", "whole/grass.####.json", "farm/grass.####.json"]), "the same\n");
+}
+
+#[test]
+fn a_template_of_open_job_description_has_steps_parts_and_a_merge() {
+    let bench = Bench::with_graph(SCENE);
+    bench.done(&["job", "g.json", "--engine", "openjd", "--chunk", "4", "--wedge", "wind.blend=0.5,1"]);
+    // It is JSON, which is YAML too.
+    let template: Value = serde_json::from_str(&fs::read_to_string(bench.path("out/g.openjd.yaml")).unwrap()).unwrap();
+    let names: Vec<&str> =
+        template["steps"].as_array().unwrap().iter().map(|step| step["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["solve-fall", "still", "frames", "merge"]);
+    let parameters = &template["steps"][2]["parameterSpace"]["taskParameterDefinitions"];
+    assert_eq!(parameters[0]["range"], json!(["1-4", "5-8", "9-9"]));
+    assert_eq!(parameters[1]["range"], json!(["0.5", "1"]));
+    let dependencies: Vec<&str> = template["steps"][3]["dependencies"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|one| one["dependsOn"].as_str().unwrap())
+        .collect();
+    assert_eq!(dependencies, ["solve-fall", "still", "frames"]);
+    let args = template["steps"][2]["script"]["actions"]["onRun"]["args"].as_array().unwrap();
+    assert!(args.contains(&json!("wind.blend={{Task.Param.Wedge}}")));
+    assert!(args.contains(&json!("{{Param.Out}}/wedges/wind.blend={{Task.Param.Wedge}}/parts/{{Task.Param.Part}}")));
+    let parameters: Vec<&str> =
+        template["parameterDefinitions"].as_array().unwrap().iter().map(|one| one["name"].as_str().unwrap()).collect();
+    assert_eq!(parameters, ["Graph", "Out", "Cache", "Convect"]);
+}
+
+/// The script of Slurm, with a stand-in for `sbatch` that runs each task at once.
+#[cfg(unix)]
+#[test]
+fn the_script_of_slurm_runs_each_task_and_queues_those_worth_a_retry() {
+    let bench = Bench::with_graph(SCENE);
+    bench.done(&["cook", "g.json", "--out", "whole", "--output", "grass", "--output", "still"]);
+    bench.done(&["job", "g.json", "--engine", "slurm", "--out", "farm", "--chunk", "5"]);
+    bench.write(
+        "bin/sbatch",
+        "#!/bin/bash\nwhile [[ $1 == --* ]]; do case $1 in --array=*) last=${1#--array=0-}; last=${last%%%*} ;; esac; shift; done\n\
+         for index in $(seq 0 \"$last\"); do SLURM_JOB_ID=7 SLURM_ARRAY_JOB_ID=7 SLURM_ARRAY_TASK_ID=$index bash \"$@\" >&2; \
+         echo \"$3 $index ended with $?\" >> log; done\necho 7\n",
+    );
+    bench.write("bin/scontrol", "#!/bin/bash\necho \"scontrol $*\" >> log\n");
+    let script = |convect: &str| {
+        let path = format!("{}:{}", bench.path("bin").display(), std::env::var("PATH").unwrap());
+        let chmod =
+            Command::new("chmod").args(["+x", "bin/sbatch", "bin/scontrol"]).current_dir(bench.path("")).status();
+        assert!(chmod.unwrap().success());
+        let _ = fs::remove_file(bench.path("log"));
+        let done = Command::new("bash")
+            .args(["farm/g.slurm.sh"])
+            .current_dir(bench.path(""))
+            .env("PATH", path)
+            .env("CONVECT", convect)
+            .output()
+            .unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        fs::read_to_string(bench.path("log")).unwrap()
+    };
+    let log = script(env!("CARGO_BIN_EXE_convect"));
+    let expected = "solve-fall 0 ended with 0\nstill 0 ended with 0\nframes 0 ended with 0\nframes 1 ended with 0\n\
+        merge 0 ended with 0\n";
+    assert_eq!(log, expected);
+    for name in ["grass", "still"] {
+        let [whole, merged] = [format!("whole/{name}.usdc"), format!("farm/{name}.usda")];
+        assert_eq!(bench.done(&["diff", &whole, &merged]), "the same\n");
+    }
+    // 3 is final, 1 is not.
+    bench.write("fails", "#!/bin/bash\n[ \"$1\" = merge ] && exit 3\nexit 1\n");
+    let chmod = Command::new("chmod").args(["+x", "fails"]).current_dir(bench.path("")).status();
+    assert!(chmod.unwrap().success());
+    let log = script("./fails");
+    assert!(log.contains("scontrol requeue 7_1\nframes 1 ended with 1\nmerge 0 ended with 3\n"), "{log}");
+}
