@@ -111,9 +111,8 @@ const FARTHEST: f32 = 64.0;
 /// Cells that a solid moves in a substep, at most, for liquid to notice it on its way.
 const FASTEST: f32 = 2.5;
 
-/// Cells past the liquid, besides those that it moves, whose velocity is needed: φ has to be right where it comes next to the
-/// surface, and a velocity is read from faces a cell farther. Distances beyond are made anew from there.
-const BAND: i32 = 3;
+/// Cells past the liquid, besides those that it moves, whose velocity is needed: a surface follows the flow in a band.
+const BAND: i32 = 5;
 
 /// Cells past the liquid whose velocity a substep needs, at most.
 pub(super) const MOST_LAYERS: i32 = BAND + FARTHEST as i32;

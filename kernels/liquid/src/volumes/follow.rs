@@ -134,7 +134,7 @@ impl VolumeTargets {
         for (old, piece) in self.pieces.iter().enumerate().filter(|(old, _)| !is_marked[*old]) {
             let near = |(_, away): &(usize, f32)| f64::from(*away) <= libm::cbrt(piece.measured / unit);
             match found.closest(scale(piece.place, size)).filter(near) {
-                Some((new, _)) if found.all[new].area.all <= 0.0 => passages.push(Passage { old, new, markers: 1 }),
+                Some((new, _)) if found.all[new].area <= 0.0 => passages.push(Passage { old, new, markers: 1 }),
                 _ => {}
             }
         }

@@ -21,7 +21,6 @@ mod phases;
 mod pieces;
 #[cfg(test)]
 mod tests;
-mod thick;
 
 use std::mem::take;
 
@@ -36,7 +35,6 @@ use crate::step::Surface;
 use follow::marked;
 use phases::{Ways, ways_of_phases};
 use pieces::{Measured, Pieces};
-use thick::Area;
 
 /// Error of a piece's volume ÷ its target up to which its surface stays.
 pub const LEAST_ERROR: f64 = 1e-5;
@@ -430,24 +428,20 @@ impl VolumeTargets {
         let count = found.phases.count();
         let of_piece = |n: usize| {
             let (piece, targets) = (&found.all[n], &self.pieces[n]);
-            let target = targets.volume() / unit;
+            let (target, per_way) = (targets.volume() / unit, responses[n] * piece.area);
             let error = target - piece.volume;
-            if error.abs() <= LEAST_ERROR * target || piece.area.all <= 0.0 {
-                return (vec![0.0; count], 1.0);
+            if error.abs() <= LEAST_ERROR * target || piece.area <= 0.0 {
+                return vec![0.0; count];
             }
-            // Half of what may move now: more is there for what comes back less than its area says.
-            let least = piece.area.least(2.0 * error.abs() / (responses[n] * cap));
-            let per_way = |area: Area| responses[n] * area.moved(least);
             if count == 1 {
-                return (vec![(error / per_way(piece.area)).clamp(-cap, cap)], least);
+                return vec![(error / per_way).clamp(-cap, cap)];
             }
             let lack = |phase| (targets.of_phase(phase) / unit - found.volume_of(n, phase)) * error.signum();
             let lacks: Vec<f64> = (0..count).map(|phase| lack(phase).max(0.0)).collect();
-            let areas: Vec<f64> = (0..count).map(|phase| per_way(found.phases.area(n, phase, piece.area))).collect();
-            (ways_of_phases(error, &lacks, &areas, cap), least)
+            let areas: Vec<f64> = (0..count).map(|phase| responses[n] * found.phases.area(n, phase, 0.0)).collect();
+            ways_of_phases(error, &lacks, &areas, cap)
         };
-        let (all, least): (Vec<_>, Vec<_>) = (0..found.all.len()).map(of_piece).unzip();
-        Ways { count, all: all.concat(), least }
+        Ways { count, all: (0..found.all.len()).flat_map(of_piece).collect() }
     }
 }
 

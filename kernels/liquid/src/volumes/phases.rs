@@ -6,7 +6,6 @@ use numerics::parallel;
 use numerics::vector::{Vec3, scale};
 
 use super::pieces::{HOLDS, Pieces};
-use super::thick::Area;
 use crate::carried::{PhaseReader, PhaseShares};
 use crate::level_set::PhiView;
 use crate::rows::Finder;
@@ -18,7 +17,7 @@ pub(super) struct PhasesOfPieces {
     count: usize,
     /// By piece, then by phase: shares of its volume; areas, in surface cells. Empty where there is one.
     shares: Vec<f64>,
-    areas: Vec<Area>,
+    areas: Vec<f64>,
 }
 
 impl PhasesOfPieces {
@@ -33,7 +32,7 @@ impl PhasesOfPieces {
         phases: &PhaseShares,
         pieces: &Pieces,
         view: PhiView<'_>,
-        free: &[(Vec3, u32, Area)],
+        free: &[(Vec3, u32, f64)],
         size: f32,
     ) -> Self {
         let by = 1.0 / size;
@@ -54,21 +53,18 @@ impl PhasesOfPieces {
                 }
             }
         });
-        let areas = [|area: Area| area.all, |area: Area| area.thick].map(|of| {
-            sums(free, |free, add| {
-                let mut reader = phases.reader();
-                for (place, piece, area) in free {
-                    reader.each(scale(*place, by), |phase, share| add(*piece, phase, of(*area) * f64::from(share)));
-                }
-            })
+        let areas = sums(free, |free, add| {
+            let mut reader = phases.reader();
+            for (place, piece, area) in free {
+                reader.each(scale(*place, by), |phase, share| add(*piece, phase, area * f64::from(share)));
+            }
         });
-        let count = volumes.keys().chain(areas[0].keys()).map(|(_, phase)| phase + 1).max().unwrap_or(1) as usize;
-        let len = count * pieces.all.len();
-        let mut out = Self { count, shares: vec![0.0; len], areas: vec![Area::default(); len] };
-        let at = |(piece, phase): (u32, u32)| piece as usize * count + phase as usize;
-        volumes.iter().for_each(|(key, sum)| out.shares[at(*key)] = *sum);
-        areas[0].iter().for_each(|(key, sum)| out.areas[at(*key)].all = *sum);
-        areas[1].iter().for_each(|(key, sum)| out.areas[at(*key)].thick = *sum);
+        let count = volumes.keys().chain(areas.keys()).map(|(_, phase)| phase + 1).max().unwrap_or(1) as usize;
+        let mut out = Self { count, shares: vec![0.0; count * pieces.all.len()], areas: Vec::new() };
+        out.areas = out.shares.clone();
+        for (sums, out) in [(&volumes, &mut out.shares), (&areas, &mut out.areas)] {
+            sums.iter().for_each(|((piece, phase), sum)| out[*piece as usize * count + *phase as usize] = *sum);
+        }
         for shares in out.shares.chunks_mut(count) {
             let sum = shares.iter().fold(0.0, |sum, share| sum + share);
             shares.iter_mut().for_each(|share| *share /= sum);
@@ -90,7 +86,7 @@ impl PhasesOfPieces {
     }
 
     /// The area of a piece's free surface, of `all` of it.
-    pub(super) fn area(&self, piece: usize, phase: usize, all: Area) -> Area {
+    pub(super) fn area(&self, piece: usize, phase: usize, all: f64) -> f64 {
         if self.count == 1 { all } else { self.areas[piece * self.count + phase] }
     }
 }
@@ -102,8 +98,6 @@ pub(super) struct Ways {
     pub(super) count: usize,
     /// By piece, then by phase.
     pub(super) all: Vec<f64>,
-    /// By piece, what moves of a way where it is not thick.
-    pub(super) least: Vec<f32>,
 }
 
 impl Ways {

@@ -6,7 +6,6 @@ use numerics::parallel;
 use numerics::vector::{Vec3, dot, length, scale, sub};
 
 use super::phases::{PhasesOfPieces, Ways};
-use super::thick::{Area, Shares, raised};
 use crate::carried::{PhaseReader, PhaseShares};
 use crate::extract::{Placement, QuadMesh, extract_with};
 use crate::level_set::Distance;
@@ -17,7 +16,7 @@ use crate::rows::{Cell, CellRows, Finder, Periods, RowSpan};
 use crate::sets::Sets;
 
 /// Distance, in cells, up to which φ moves with a shift; beyond, it is made anew from there.
-const NEAR: f32 = 2.0;
+const NEAR: f32 = 3.0;
 /// Steps down the slope of φ to the piece that it belongs to.
 const DESCENT: usize = 5;
 /// A piece whose volume changed by more than this share is another.
@@ -35,7 +34,7 @@ pub(super) struct Measured {
     /// What its surface encloses, without its bubbles.
     pub(super) volume: f64,
     /// The area of its surface, bubbles included, walls and solids not.
-    pub(super) area: Area,
+    pub(super) area: f64,
     /// The mean of its cells.
     pub(super) place: Vec3,
 }
@@ -75,24 +74,16 @@ impl Pieces {
             surface.put_outside(&mut mesh, solid);
         }
         let (of_span, count) = numbered(&inside, surface.periods(), &mesh, &sides);
-        let shares: Vec<f32> = parallel::tabulate_with(
-            sides.len(),
-            parallel::CHUNK,
-            || Shares::new(whole, clipped.as_deref()),
-            |shares, n| if sides[n].is_free { shares.beside(mesh.middle(mesh.quads[n])) } else { 0.0 },
-        );
-        let all = measured(&inside, &of_span, count, &mesh, &sides, &shares);
+        let all = measured(&inside, &of_span, count, &mesh, &sides);
         let mut found = Self { all, inside, of_span, clipped, phases: PhasesOfPieces::one() };
         if let Some(phases) = phases {
-            let free: Vec<(Vec3, u32, Area)> = mesh
+            let free: Vec<(Vec3, u32, f64)> = mesh
                 .quads
                 .iter()
-                .zip(sides.iter().zip(&shares))
-                .filter(|(_, (side, _))| side.is_free)
-                .map(|(quad, (side, share))| {
-                    let all = 0.5 * mesh.twice_area(*quad);
-                    let area = Area { all, thick: f64::from(*share) * all };
-                    (mesh.middle(*quad), found.of_span[side.span as usize], area)
+                .zip(&sides)
+                .filter(|(_, side)| side.is_free)
+                .map(|(quad, side)| {
+                    (mesh.middle(*quad), found.of_span[side.span as usize], 0.5 * mesh.twice_area(*quad))
                 })
                 .collect();
             let view = surface.view_of(found.clipped.as_deref());
@@ -134,8 +125,7 @@ impl Pieces {
     /// Area · way of the surface of each piece.
     pub(super) fn swept(&self, ways: &Ways) -> Vec<f64> {
         let of_piece = |(n, piece): (usize, &Measured)| {
-            let area = |phase| self.phases.area(n, phase, piece.area).moved(ways.least[n]);
-            let of_phase = |phase| ways.all[n * ways.count + phase] * area(phase);
+            let of_phase = |phase| ways.all[n * ways.count + phase] * self.phases.area(n, phase, piece.area);
             (0..ways.count).map(of_phase).fold(0.0, |sum, swept| sum + swept)
         };
         self.all.iter().enumerate().map(of_piece).collect()
@@ -212,21 +202,17 @@ impl Pieces {
         let view = surface.view_of(self.clipped.as_deref());
         let (phi, by) = (surface.level_set().phi(), 1.0 / surface.resolution() as f32);
         let (pieces, below) = (self.of_cells(view.rows), self.downhill(view, phi));
-        let whole = surface.view_of(None);
-        let start = || (phases.map(PhaseShares::reader), Shares::new(whole, self.clipped.as_deref()));
-        let least = |piece: u32| ways.least.get(piece as usize).copied().unwrap_or(1.0);
-        let [cells] = view.rows.tabulate_with(start, |(reader, shares), cell, at| {
+        let start = || phases.map(PhaseShares::reader);
+        let [cells] = view.rows.tabulate_with(start, |reader, cell, at| {
             let piece = if phi[at].abs() < NEAR { descend(&pieces, &below, at) } else { NO_PIECE };
-            let place = cell.map(|x| x as f32 + 0.5);
-            let way = ways.at(piece, reader.as_mut(), || scale(place, by));
-            [if way == 0.0 { 0.0 } else { way * raised(shares.beside(place), least(piece)) }]
+            let middle = || cell.map(|x| (x as f32 + 0.5) * by);
+            [ways.at(piece, reader.as_mut(), middle)]
         });
         let (markers, pieces) = (&surface.markers().markers, surface.markers().pieces());
-        let of_marker = |(reader, shares): &mut (Option<PhaseReader<'_>>, Shares<'_>), n: usize| {
-            let Marker { point, normal } = markers[n];
-            let way = ways.at(pieces[n], reader.as_mut(), || scale(point, by));
-            if way == 0.0 { 0.0 } else { way * raised(shares.at(point, normal), least(pieces[n])) }
+        let of_marker = |reader: &mut Option<PhaseReader<'_>>, n: usize| {
+            ways.at(pieces[n], reader.as_mut(), || scale(markers[n].point, by))
         };
+        let start = || phases.map(PhaseShares::reader);
         let markers = parallel::tabulate_with(markers.len(), parallel::CHUNK, start, of_marker);
         surface.shift(&cells, &markers);
     }
@@ -386,14 +372,7 @@ fn join_touching(spans: &[RowSpan], others: &[RowSpan], sets: &mut Sets) {
     }
 }
 
-fn measured(
-    inside: &CellRows,
-    of_span: &[u32],
-    count: usize,
-    mesh: &QuadMesh,
-    sides: &[Side],
-    shares: &[f32],
-) -> Vec<Measured> {
+fn measured(inside: &CellRows, of_span: &[u32], count: usize, mesh: &QuadMesh, sides: &[Side]) -> Vec<Measured> {
     let piece = |side: &Side| of_span[side.span as usize] as usize;
     let mut origins: Vec<Option<Vec3>> = vec![None; count];
     for (quad, side) in mesh.quads.iter().zip(sides) {
@@ -406,11 +385,10 @@ fn measured(
     };
     let terms: Vec<(f64, f64)> = parallel::tabulate(sides.len(), parallel::CHUNK, term);
     let mut all = vec![Measured::default(); count];
-    for (((volume, area), side), share) in terms.iter().zip(sides).zip(shares) {
+    for ((volume, area), side) in terms.iter().zip(sides) {
         let piece = &mut all[piece(side)];
         piece.volume += volume / 6.0;
-        piece.area.all += area / 2.0;
-        piece.area.thick += f64::from(*share) * area / 2.0;
+        piece.area += area / 2.0;
     }
     // Sums over cells, then how many they are.
     let mut sums = vec![[0.0_f64; 4]; count];

@@ -85,31 +85,6 @@ fn bubbles_belong_to_the_piece_around_them_and_drops_in_them_do_not() {
 }
 
 #[test]
-fn volume_comes_back_where_the_liquid_is_thick() {
-    // A pool six cells deep, and a sheet 1.6 cells thick that stands in it.
-    let sheet = |p: Vec3| ((p[0] - 12.0).abs() - 0.8).max(p[1] - 14.0);
-    let (mut surface, mut targets) = start([24, 20, 12], move |p| (p[1] - 6.0).min(sheet(p)));
-    let farthest = |surface: &MarkedSurface, is_in: &dyn Fn(Vec3) -> bool, of: &dyn Fn(Vec3) -> f32| {
-        surface.mesh(None).points.iter().filter(|p| is_in(**p)).map(|p| of(*p)).fold(f32::NEG_INFINITY, f32::max)
-    };
-    let half_sheet =
-        |surface: &MarkedSurface| farthest(surface, &|p| (9.0..12.0).contains(&p[1]), &|p| (p[0] - 12.0).abs());
-    let level = |surface: &MarkedSurface| farthest(surface, &|p| p[0] < 8.0, &|p| p[1]);
-    let before = [half_sheet(&surface), level(&surface)];
-    let pool = (24.0 - 1.6) * 12.0;
-    targets.add(0.03 * pool, None);
-    let report = targets.correct(&mut surface, None);
-    assert!(report.drift.abs() < 1e-4, "{report:?}");
-    assert!((half_sheet(&surface) - before[0]).abs() < 1e-3, "{} {}", half_sheet(&surface), before[0]);
-    // Where sheet and pool meet the surface moves less.
-    assert!((level(&surface) - before[1] - 0.03).abs() < 4e-3, "{} {}", level(&surface), before[1]);
-    // More than the pool takes in a frame: then the sheet takes its part.
-    targets.add(0.15 * pool, None);
-    targets.correct(&mut surface, None);
-    assert!(half_sheet(&surface) > before[0] + 0.01);
-}
-
-#[test]
 fn a_ball_that_splits_shares_its_target() {
     let size = [36, 22, 22];
     let (mut surface, mut targets) = start(size, ball([17.0, 11.0, 11.0], 8.0));
