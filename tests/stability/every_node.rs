@@ -285,7 +285,8 @@ fn reads(node: &Node, kind: Option<Kind>) -> bool {
 
 fn rows() {
     let mut wrong = Vec::new();
-    for node in convect::CATALOGUE.nodes() {
+    // What reads USD has no value to begin with: files are tested by formats.
+    for node in convect::CATALOGUE.nodes().filter(|node| node.name != "Usd_In") {
         let plain = graph(node, "").map(|graph| cook(graph, node, Change::Nothing, 1));
         match plain.as_ref().map(judged) {
             Ok(Ok((Outcome::Finite | Outcome::Capped, _))) => {}
@@ -332,7 +333,8 @@ fn is_dear(spec: &ParamSpec, end: &Value) -> bool {
 
 fn ends() {
     let mut wrong = Vec::new();
-    for node in convect::CATALOGUE.nodes() {
+    // What reads USD has no value to begin with: files are tested by formats.
+    for node in convect::CATALOGUE.nodes().filter(|node| node.name != "Usd_In") {
         let (mut accepted, mut refused) = (0, Vec::new());
         for spec in node.param_specs().iter().filter(|spec| !needed(node.name).contains(spec.name)) {
             for RangeEnd { inside, outside } in range_ends(spec) {

@@ -107,7 +107,11 @@ fn conforms_to_its_declaration() {
             .set(START_FRAME_RANGE, span(-40.0, 30.0))
             .set(LIFE_RANGE, span(5.0, 200.0))
     };
-    conformance(&NODE).with(|bench| bench.changed(CONTROLS, as_control)).with(small).run();
+    conformance(&NODE)
+        .with(|bench| bench.changed(CONTROLS, as_control))
+        .with(small)
+        .with(move |bench| small(bench).set(LOOP, 20.0))
+        .run();
 }
 
 #[test]

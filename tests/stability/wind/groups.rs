@@ -57,7 +57,10 @@ pub(super) fn clumps_of_any_numbers_hold() {
             ("a radius of 1e30", clumped(r#""clump_radius": 1e30"#)),
             ("a radius of 1e-45", clumped(r#""clump_radius": 1e-45"#)),
             ("a huge mask", clumped(r#""clump_radius": 0.3, "clump_blend": { "value": 1, "attribute": "huge" }"#)),
-            ("one CV", clumped(r#""clump_radius": 1"#).fur(|_| curves(&vec![vec![[0.0, 0.5, 0.0]]; 3]))),
+            (
+                "clumps of curves of one CV",
+                clumped(r#""clump_radius": 1"#).fur(|_| curves(&vec![vec![[0.0, 0.5, 0.0]]; 3])),
+            ),
             ("no curves", clumped(r#""clump_radius": 1"#).fur(|_| curves(&[]))),
             (
                 "1e30",

@@ -67,7 +67,7 @@ pub(super) fn curves_of_any_shape_are_resampled() {
             ("10,000 CVs", fine(r#""cvs": 10000"#)),
             ("a spacing of 1e-4", fine(r#""spacing": 1e-4"#)),
             ("a spacing of 1e30", fine(r#""spacing": 1e30"#)),
-            ("one CV", fine("").fur(move |_| curves(&vec![vec![root]; 3]))),
+            ("resampled curves of one CV", fine("").fur(move |_| curves(&vec![vec![root]; 3]))),
             ("all CVs equal", fine("").fur(move |_| curves(&vec![vec![root; 5]; 20]))),
             ("two CVs 1e30 m apart", fine("").fur(|_| curves(&[vec![[0.0; 3], [1e30, 0.0, 0.0]]]))),
             ("denormal", fine(r#""spacing": 1e-42"#).fur(|_| curves(&[vec![[0.0; 3], [1e-41, 0.0, 0.0]]]))),

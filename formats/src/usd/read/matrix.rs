@@ -28,7 +28,7 @@ impl Matrix {
         matrix
     }
 
-    pub(super) fn scale(by: [f64; 3]) -> Self {
+    pub(super) fn scaling(by: [f64; 3]) -> Self {
         let mut matrix = Self::IDENTITY;
         (0..3).for_each(|k| matrix.0[k][k] = by[k]);
         matrix
@@ -151,22 +151,22 @@ mod tests {
 
     #[test]
     fn an_inverse_undoes_and_a_flat_matrix_has_none() {
-        let matrix = Matrix::scale([2.0, -1.0, 4.0])
+        let matrix = Matrix::scaling([2.0, -1.0, 4.0])
             .then(&Matrix::rotation(0, 30.0))
             .then(&Matrix::translation([1.0, 2.0, 3.0]));
         let back = matrix.inverse().unwrap();
         assert!(close(back.point(matrix.point([5.0, 6.0, 7.0])), [5.0, 6.0, 7.0]));
         assert!((matrix.determinant() + 8.0).abs() < 1e-12 && (matrix.size() - 2.0).abs() < 1e-12);
-        assert_eq!(Matrix::scale([1.0, 0.0, 1.0]).inverse(), None);
+        assert_eq!(Matrix::scaling([1.0, 0.0, 1.0]).inverse(), None);
     }
 
     #[test]
     fn normals_stay_at_right_angles() {
-        let matrix = Matrix::scale([1.0, 4.0, 1.0]).then(&Matrix::rotation(2, 20.0));
+        let matrix = Matrix::scaling([1.0, 4.0, 1.0]).then(&Matrix::rotation(2, 20.0));
         let along = matrix.vector([1.0, 1.0, 0.0]);
         let normal = matrix.of_normals().vector([1.0, -1.0, 0.0]);
         assert!(along.iter().zip(normal).map(|(a, b)| a * b).sum::<f64>().abs() < 1e-12);
-        let mirrored = Matrix::scale([-1.0, 1.0, 1.0]).of_normals().vector([0.0, 1.0, 0.0]);
+        let mirrored = Matrix::scaling([-1.0, 1.0, 1.0]).of_normals().vector([0.0, 1.0, 0.0]);
         assert_eq!(mirrored, [0.0, 1.0, 0.0]);
     }
 }

@@ -413,10 +413,10 @@ fn in_place(array: Array, role: Role, matrix: &Matrix) -> Array {
         Role::Point => matrix.point(row),
         Role::Vector => matrix.vector(row),
         _ => {
-            let length = |v: [f64; 3]| v.iter().fold(0.0, |sum, x| sum + x * x).sqrt();
+            let row_length = |v: [f64; 3]| v.iter().fold(0.0, |sum, x| sum + x * x).sqrt();
             let turned = normals.vector(row);
             // A normal keeps the length that it has.
-            let factor = length(row) / length(turned);
+            let factor = row_length(row) / row_length(turned);
             if factor.is_finite() { turned.map(|x| x * factor) } else { row }
         }
     };

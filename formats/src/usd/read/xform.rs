@@ -16,7 +16,7 @@ pub(super) fn to_ours(root: &Layer) -> Result<Matrix> {
     let up = root.value_of(0, "upAxis")?;
     let is_z_up = up.as_ref().and_then(Value::text) == Some("Z");
     let axes = Matrix([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]);
-    let scale = Matrix::scale([unit; 3]);
+    let scale = Matrix::scaling([unit; 3]);
     Ok(if is_z_up { axes.then(&scale) } else { scale })
 }
 
@@ -68,12 +68,12 @@ fn operation_matrix(name: &str, value: &Value) -> Option<Matrix> {
         "translateX" => Matrix::translation([value.number()?, 0.0, 0.0]),
         "translateY" => Matrix::translation([0.0, value.number()?, 0.0]),
         "translateZ" => Matrix::translation([0.0, 0.0, value.number()?]),
-        "scale" => Matrix::scale(vector()?),
-        "scaleX" => Matrix::scale([value.number()?, 1.0, 1.0]),
-        "scaleY" => Matrix::scale([1.0, value.number()?, 1.0]),
-        "scaleZ" => Matrix::scale([1.0, 1.0, value.number()?]),
+        "scale" => Matrix::scaling(vector()?),
+        "scaleX" => Matrix::scaling([value.number()?, 1.0, 1.0]),
+        "scaleY" => Matrix::scaling([1.0, value.number()?, 1.0]),
+        "scaleZ" => Matrix::scaling([1.0, 1.0, value.number()?]),
         "orient" => match value {
-            Value::Quaternion(q) => Matrix::orientation(unit(*q)?),
+            Value::Quaternion(q) => Matrix::orientation(normalized_quaternion(*q)?),
             _ => return None,
         },
         "transform" => match value {
@@ -91,7 +91,7 @@ fn operation_matrix(name: &str, value: &Value) -> Option<Matrix> {
     })
 }
 
-fn unit(q: [f64; 4]) -> Option<[f64; 4]> {
+fn normalized_quaternion(q: [f64; 4]) -> Option<[f64; 4]> {
     let length = q.iter().fold(0.0, |sum, x| sum + x * x).sqrt();
     (length > 0.0).then(|| q.map(|x| x / length))
 }
