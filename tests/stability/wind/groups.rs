@@ -61,7 +61,7 @@ pub(super) fn clumps_of_any_numbers_hold() {
                 "clumps of curves of one CV",
                 clumped(r#""clump_radius": 1"#).fur(|_| curves(&vec![vec![[0.0, 0.5, 0.0]]; 3])),
             ),
-            ("no curves", clumped(r#""clump_radius": 1"#).fur(|_| curves(&[]))),
+            ("clumps of no curves", clumped(r#""clump_radius": 1"#).fur(|_| curves(&[]))),
             (
                 "1e30",
                 clumped(r#""clump_radius": 1e29"#)

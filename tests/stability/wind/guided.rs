@@ -64,11 +64,11 @@ pub(super) fn curves_of_any_shape_are_resampled() {
     let cooked = hold(
         "10",
         [
-            ("10,000 CVs", fine(r#""cvs": 10000"#)),
+            ("curves resampled to 10,000 CVs", fine(r#""cvs": 10000"#)),
             ("a spacing of 1e-4", fine(r#""spacing": 1e-4"#)),
             ("a spacing of 1e30", fine(r#""spacing": 1e30"#)),
             ("resampled curves of one CV", fine("").fur(move |_| curves(&vec![vec![root]; 3]))),
-            ("all CVs equal", fine("").fur(move |_| curves(&vec![vec![root; 5]; 20]))),
+            ("resampled curves of equal CVs", fine("").fur(move |_| curves(&vec![vec![root; 5]; 20]))),
             ("two CVs 1e30 m apart", fine("").fur(|_| curves(&[vec![[0.0; 3], [1e30, 0.0, 0.0]]]))),
             ("denormal", fine(r#""spacing": 1e-42"#).fur(|_| curves(&[vec![[0.0; 3], [1e-41, 0.0, 0.0]]]))),
         ],

@@ -117,6 +117,7 @@ pub(super) fn owned(array: Array, interpolation: &str, counts: &RowCounts<'_>) -
             1 => Ok((Owner::Once, array)),
             _ => Err(format!("has {rows} rows for the whole prim, of which one can be kept")),
         },
+        "uniform" if counts.kind != Kind::Points && rows == 1 && counts.elements == 1 => Ok((Owner::Element, array)),
         // Widths and normals of a whole prim are often written without saying so.
         _ if rows == 1 && counts.points != 1 => Ok((Owner::Once, array)),
         "uniform" if counts.kind != Kind::Points => of(Owner::Element, counts.elements, &noun(Owner::Element)),
