@@ -89,7 +89,7 @@ pub(crate) const NEUTRAL: &[Neutral] = &[
     Neutral {
         without: on_fur("no gusts", &[FUR, MOVING, GUSTS[0], BLOWN], "blown"),
         with: on_fur("gusts that do not reach the fur", &[FUR, MOVING, GUSTS[1], BLOWN], "blown"),
-        missed: false,
+        missed: true,
     },
     Neutral {
         without: Case {
