@@ -125,14 +125,14 @@ fn listed(frames: &[Frame]) -> String {
 /// Merges one output and says what was written.
 fn merge(args: &MergeArgs, name: &str, pieces: &[Piece]) -> Result<String, Failure> {
     let frames: usize = pieces.iter().map(|piece| piece.frames.len()).sum();
-    let s = if frames == 1 { "" } else { "s" };
+    let [s, of_parts] = [frames, pieces.len()].map(|count| if count == 1 { "" } else { "s" });
     let is_stage = pieces.iter().all(|piece| matches!(&piece.files[..], [file] if is_usd(file)));
     let path = match (is_stage, args.one_file) {
         (true, true) => one_file(&args.folder, name, pieces)?,
         (true, false) => clips(&args.folder, name, pieces)?,
         (false, _) => sequence(&args.folder, name, pieces)?,
     };
-    Ok(format!("wrote {}: {frames} frame{s} of {} parts", path.display(), pieces.len()))
+    Ok(format!("wrote {}: {frames} frame{s} of {} part{of_parts}", path.display(), pieces.len()))
 }
 
 fn opened(pieces: &[Piece]) -> Result<Vec<UsdFile>, Failure> {

@@ -25,7 +25,7 @@ const WIND: &str = r#""wind": { "type": "Curve_Wind", "inputs": { "curves": "fur
 const PAINTED: &str = r#""painted": { "type": "Attribute_Expr", "inputs": { "geometry": "fur" },
     "params": { "component": "curves", "code": "heat = P.y" } },"#;
 
-/// A block of water that falls, with a number of cells above it.
+/// A block of liquid.
 const DROP: &str = r#"
     "block": { "type": "Mesh_Primitive", "params": { "size": [0.3, 0.3, 0.3], "divisions": 1 } },"#;
 
@@ -41,6 +41,16 @@ const HELD: &str = r#"
 /// A case on the fur.
 const fn on_fur(name: &'static str, nodes: &'static [&'static str], output: &'static str) -> Case {
     Case { name, nodes, before: &["fur", "ball"], output, frames: 6 }
+}
+
+/// A case on the block of liquid.
+const fn on_liquid(name: &'static str, nodes: &'static [&'static str]) -> Case {
+    Case { name, nodes, before: &["block"], output: "node.surface", frames: 6 }
+}
+
+/// A case on the beam that is held.
+const fn on_beam(name: &'static str, nodes: &'static [&'static str]) -> Case {
+    Case { name, nodes, before: &["body", "pins", "goal"], output: "node.tets", frames: 24 }
 }
 
 pub(crate) const NEUTRAL: &[Neutral] = &[
@@ -92,82 +102,64 @@ pub(crate) const NEUTRAL: &[Neutral] = &[
         missed: true,
     },
     Neutral {
-        without: Case {
-            name: "no goals",
-            nodes: &[
+        without: on_beam(
+            "no goals",
+            &[
                 HELD,
                 r#""node": { "type": "Softbody", "inputs": { "bodies": ["body"], "pins": ["pins"] },
                                         "params": { "stiffness": 3e6, "damping": 1e-3, "self_collision": false } },"#,
             ],
-            before: &["body", "pins", "goal"],
-            output: "node.tets",
-            frames: 24,
-        },
-        with: Case {
-            name: "goals of strength 0",
-            nodes: &[
+        ),
+        with: on_beam(
+            "goals of strength 0",
+            &[
                 HELD,
                 r#""node": { "type": "Softbody", "inputs": { "bodies": ["body"], "pins": ["pins"], "goals": ["goal"] },
                                         "params": { "stiffness": 3e6, "damping": 1e-3, "self_collision": false, "reset_to_goals": 0 } },"#,
             ],
-            before: &["body", "pins", "goal"],
-            output: "node.tets",
-            frames: 24,
-        },
+        ),
         missed: false,
     },
     Neutral {
-        without: Case {
-            name: "viscosity 0, solved after pressure",
-            nodes: &[
+        without: on_liquid(
+            "viscosity 0, solved after pressure",
+            &[
                 DROP,
                 r#""node": { "type": "FluidSolve", "inputs": { "liquid": ["block"] }, "params": {
                                   "cell": 0.05, "viscosity": 0, "stokes": "off",
                                   "domain_from": [-0.4, -0.4, -0.4], "domain_to": [0.4, 0.4, 0.4] } },"#,
             ],
-            before: &["block"],
-            output: "node.surface",
-            frames: 6,
-        },
-        with: Case {
-            name: "viscosity 0, coupled to pressure",
-            nodes: &[
+        ),
+        with: on_liquid(
+            "viscosity 0, coupled to pressure",
+            &[
                 DROP,
                 r#""node": { "type": "FluidSolve", "inputs": { "liquid": ["block"] }, "params": {
                                   "cell": 0.05, "viscosity": 0, "stokes": "on",
                                   "domain_from": [-0.4, -0.4, -0.4], "domain_to": [0.4, 0.4, 0.4] } },"#,
             ],
-            before: &["block"],
-            output: "node.surface",
-            frames: 6,
-        },
+        ),
         missed: false,
     },
     Neutral {
-        without: Case {
-            name: "a box of 4,096 cells",
-            nodes: &[
+        without: on_liquid(
+            "a box of 4,096 cells",
+            &[
                 DROP,
                 r#""node": { "type": "FluidSolve", "inputs": { "liquid": ["block"] }, "params": {
                                   "cell": 0.05, "viscosity": 1,
                                   "domain_from": [-0.4, -0.4, -0.4], "domain_to": [0.4, 0.4, 0.4] } },"#,
             ],
-            before: &["block"],
-            output: "node.surface",
-            frames: 6,
-        },
-        with: Case {
-            name: "a box of 40,960 cells, as much liquid",
-            nodes: &[
+        ),
+        with: on_liquid(
+            "a box of 40,960 cells, as much liquid",
+            &[
                 DROP,
                 r#""node": { "type": "FluidSolve", "inputs": { "liquid": ["block"] }, "params": {
                                   "cell": 0.05, "viscosity": 1,
                                   "domain_from": [-0.4, -0.4, -0.4], "domain_to": [0.4, 7.6, 0.4] } },"#,
             ],
-            before: &["block"],
-            output: "node.surface",
-            frames: 6,
-        },
+        ),
         missed: true,
     },
     Neutral {

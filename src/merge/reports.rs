@@ -1,6 +1,7 @@
 //! The reports of parts: which frames each has, and all of them as one report.
 
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use engine::time::Frame;
@@ -24,7 +25,11 @@ pub(super) struct PartReport {
 pub(super) fn of(folder: &Path) -> Result<Vec<PartReport>, Failure> {
     let unread = |path: &Path, error| Failure::file(FileError::new(path, "read", error).to_string());
     let mut paths = Vec::new();
-    for part in fs::read_dir(folder).map_err(|error| unread(folder, error))? {
+    let parts = match fs::read_dir(folder) {
+        Err(error) if error.kind() == ErrorKind::NotFound => None,
+        parts => Some(parts.map_err(|error| unread(folder, error))?),
+    };
+    for part in parts.into_iter().flatten() {
         let part = part.map_err(|error| unread(folder, error))?.path();
         if !part.is_dir() {
             continue;
@@ -39,8 +44,10 @@ pub(super) fn of(folder: &Path) -> Result<Vec<PartReport>, Failure> {
     }
     paths.sort();
     if paths.is_empty() {
-        let line =
-            format!("`{}` has no part with a report; cook parts with `--part A-B --report FILE`", folder.display());
+        let line = format!(
+            "`{}` has no part with a report; run the tasks that `convect job` wrote first, or `convect cook --part A-B --report FILE`",
+            folder.display()
+        );
         return Err(Failure::file(line));
     }
     let read = |path: PathBuf| {
