@@ -24,6 +24,7 @@ use engine::graph::{Graph, GraphOutput, Link, probe};
 use engine::plan::Request;
 use engine::time::Frame;
 use neutral::{NEUTRAL, Neutral};
+use numerics::parallel;
 
 /// The program's own.
 #[global_allocator]
@@ -53,7 +54,7 @@ fn main() -> ExitCode {
         println!("skipped: valgrind is not installed");
         return ExitCode::SUCCESS;
     }
-    let judged = match asked.iter().map(|name| count(name)).collect::<Result<Vec<u64>, String>>() {
+    let judged = match count_all(&asked) {
         Ok(counts) => counts::judge(&asked, &counts, bless),
         Err(fault) => failed(&fault),
     };
@@ -78,8 +79,10 @@ fn judge_pairs(pairs: &[Neutral]) -> Result<(), String> {
     if !pairs.is_empty() {
         println!("\n{:<40} {:>15} {:>15} {:>9}", "features that change nothing", "without", "with", "cost");
     }
-    for Neutral { without, with, missed } in pairs {
-        let (before, after) = (count(without.name)?, count(with.name)?);
+    let names: Vec<&str> = pairs.iter().flat_map(|pair| [pair.without.name, pair.with.name]).collect();
+    let counts = count_all(&names)?;
+    for (Neutral { without, with, missed }, count) in pairs.iter().zip(counts.chunks(2)) {
+        let (before, after) = (count[0], count[1]);
         let cost = after as f64 / before as f64 - 1.0;
         let known = if *missed { "  missed" } else { "" };
         println!("{:<40} {before:>15} {after:>15} {:>+7.2} %{known}", with.name, 100.0 * cost);
@@ -110,6 +113,11 @@ fn positions(case: &Case) -> Vec<u32> {
         bits.extend(numbers);
     });
     bits
+}
+
+/// Instructions of each case, several counted at a time.
+fn count_all(names: &[&str]) -> Result<Vec<u64>, String> {
+    parallel::map(names, |_, name| count(name)).into_iter().collect()
 }
 
 /// Instructions of a case: from the call of [`measured`] to the end of a process that runs nothing else.

@@ -29,6 +29,7 @@ mod samples;
 mod suite;
 #[cfg(test)]
 mod tests;
+mod threads;
 mod trial;
 mod values;
 

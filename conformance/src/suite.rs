@@ -11,7 +11,7 @@ use crate::promises::{
 };
 use crate::samples::Form;
 use crate::trial::{Motion, Outcome, Prepare, Subject, Trial};
-use crate::values;
+use crate::{threads, values};
 use engine::error::ErrorKind;
 use engine::node::{Arity, Needs, Node};
 use engine::param::{Source, Unset};
@@ -79,22 +79,31 @@ impl Conformance {
             }
             return findings.list;
         }
-        for check in [
-            left_out::check,
-            neutral::check,
-            ranges::check,
-            params::check,
-            inputs::check,
-            attributes::check,
-            determinism::check,
-            frames::check,
-            checkpoints::check,
-        ] {
+        let of_checks = threads::map(CHECKS, |check| {
+            let mut findings = Findings { list: Vec::new(), ..findings };
             check(&subject, &tried, &mut findings);
-        }
+            findings.list
+        });
+        of_checks.into_iter().flatten().for_each(|finding| findings.add(finding));
         findings.list
     }
 }
+
+/// Checks a promise on trials and their outcomes.
+type Check = fn(&Subject, &[(Trial, Outcome)], &mut Findings);
+
+/// The checks that compare whole results, those that take longest first.
+const CHECKS: [Check; 9] = [
+    attributes::check,
+    determinism::check,
+    params::check,
+    ranges::check,
+    left_out::check,
+    inputs::check,
+    frames::check,
+    checkpoints::check,
+    neutral::check,
+];
 
 /// Findings, each once.
 #[derive(Default)]
@@ -134,7 +143,10 @@ const MIXTURES: u64 = 32;
 fn try_all(subject: &Subject) -> Vec<(Trial, Outcome)> {
     let frames = subject.frames();
     let trials = defaults(subject).into_iter().chain(singles(subject)).chain(mixtures(subject));
-    trials.map(|trial| (trial.clone(), subject.run(&trial, &frames))).collect()
+    threads::map(trials, |trial| {
+        let outcome = subject.run(&trial, &frames);
+        (trial, outcome)
+    })
 }
 
 /// Default params: with attributes and without, with optional inputs and without, lists of 0, 1 and 2 wires, and two

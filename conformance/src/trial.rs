@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::{Arc, LazyLock};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::bench::{Bench, bench};
 use crate::panics::quietly;
@@ -96,16 +96,21 @@ pub(crate) struct Outcome {
     pub(crate) given: Vec<Vec<Geometry>>,
 }
 
-/// An engine with that number of threads.
-pub(crate) fn engine(threads: usize) -> &'static Engine {
-    static ENGINES: LazyLock<[(usize, Engine); 3]> = LazyLock::new(|| {
-        // Without a cache, so that no trial finds results of an earlier one.
-        [1, 2, 7].map(|threads| {
-            (threads, Engine::new(&Settings { threads, memory: 0, ..Settings::default() }).expect("threads"))
-        })
-    });
-    let found = ENGINES.iter().find(|(count, _)| *count == threads);
-    &found.expect("one of the counts the suite tries").1
+/// Calls `cook` with an engine of that number of threads, which no other trial uses meanwhile.
+fn with_engine<T>(threads: usize, cook: impl FnOnce(&Engine) -> T) -> T {
+    static IDLE: Mutex<Vec<(usize, Engine)>> = Mutex::new(Vec::new());
+    let idle = || IDLE.lock().unwrap_or_else(PoisonError::into_inner);
+    let take = || {
+        let mut idle = idle();
+        let found = idle.iter().position(|(count, _)| *count == threads)?;
+        Some(idle.swap_remove(found).1)
+    };
+    // Without a cache, so that no trial finds results of an earlier one.
+    let settings = Settings { threads, memory: 0, ..Settings::default() };
+    let engine = take().unwrap_or_else(|| Engine::new(&settings).expect("threads"));
+    let result = cook(&engine);
+    idle().push((threads, engine));
+    result
 }
 
 impl Subject {
@@ -256,7 +261,7 @@ impl Subject {
         let cooked = quietly(|| {
             catch_unwind(AssertUnwindSafe(|| {
                 let plan = Plan::new(&graph, &request, Arc::default()).map_err(Stopped::Asked)?;
-                let report = engine(threads).cook_plan(&plan, reload, &mut sink)?;
+                let report = with_engine(threads, |engine| engine.cook_plan(&plan, reload, &mut sink))?;
                 let params = plan.params(graph.nodes.len() - 1, graph.scene.start()).ok();
                 let was_read = |index: usize| params.as_ref().is_some_and(|params| params.was_read(index));
                 let read: Vec<bool> = (0..self.specs.len()).map(was_read).collect();

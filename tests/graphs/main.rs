@@ -9,6 +9,8 @@ mod bits;
 
 use std::fs;
 use std::path::Path;
+use std::sync::Mutex;
+use std::thread;
 
 use bits::{Keys, cook, frames, graphs, has_solver, lines, load};
 use engine::cook::{DiskCache, Engine, Settings};
@@ -40,10 +42,25 @@ fn every_example_has_the_stored_bits() {
     );
 }
 
+/// Checks all examples, two at a time.
+fn for_each_graph(check: impl Fn(&Path) + Sync) {
+    let left = Mutex::new(graphs().into_iter());
+    let next = || left.lock().unwrap().next();
+    thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                while let Some(path) = next() {
+                    check(&path);
+                }
+            });
+        }
+    });
+}
+
 #[test]
 fn bits_do_not_depend_on_threads_order_or_cache() {
-    for path in graphs() {
-        let graph = load(&path);
+    for_each_graph(|path| {
+        let graph = load(path);
         let frames = frames(&graph, last(&graph));
         let expected = cook(&graph, &frames, 2, None);
         let reversed: Vec<Frame> = frames.iter().rev().copied().collect();
@@ -58,5 +75,5 @@ fn bits_do_not_depend_on_threads_order_or_cache() {
             let mut cache = DiskCache::open(folder.path(), u64::MAX);
             assert_eq!(cook(&graph, &frames, 2, Some(&mut cache)), expected, "{}: {state} cache", path.display());
         }
-    }
+    });
 }

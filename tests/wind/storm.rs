@@ -6,6 +6,7 @@
 use std::collections::BTreeMap;
 
 use engine::geometry::{Component, Geometry, V};
+use numerics::parallel;
 use parry3d_f64::math::Vector;
 use parry3d_f64::query::{PointQuery, Ray, RayCast};
 use parry3d_f64::shape::{TriMesh, TriMeshFlags};
@@ -69,26 +70,28 @@ fn fur_in_a_storm_stays_outside_the_skin_and_keeps_its_lengths() {
     let (cooked, metrics) = cook_file("bear_storm", &["fur_out", "skin", "grown", "fur"], FRAMES);
     let part = |output: usize, frame: usize| -> &Geometry { &cooked[output][frame] };
     let unfreed: &BTreeMap<_, f64> = &metrics["fur_out"]["unfreed_segments"];
-    let (mut crossed, mut at_rest, mut allowed, mut buried) = (0, 0, 0.0, [0, 0]);
-    let mut lengths = 0.0_f64;
-    for frame in 0..FRAMES as usize {
-        let mesh = part(1, frame).mesh().unwrap();
-        let body = skin(mesh);
+    let of_frames = parallel::map(0..FRAMES as usize, |_, frame| {
+        let body = skin(part(1, frame).mesh().unwrap());
         let [out, grown, fur] = [0, 2, 3].map(|output| part(output, frame).curves().unwrap());
         assert!(out.positions().as_flattened().iter().all(|x| x.is_finite()));
         assert!(out.get(V).is_none());
         let found = crossings(out, &body);
         let unfreed = unfreed.values().nth(frame).unwrap();
         assert!(found as f64 <= *unfreed, "frame {}: {found} crossings, {unfreed} unfreed", frame + 1);
-        crossed += found;
-        allowed += unfreed;
-        lengths = lengths.max(length_error(out, fur));
-        if frame % 12 == 0 {
-            at_rest += crossings(grown, &body);
+        let at_rest = (frame % 12 == 0).then(|| {
             let [now, then] = [inside(out, &body), inside(grown, &body)];
             assert!(now <= then, "frame {}: {now} segments inside, {then} at rest", frame + 1);
-            buried = [buried[0] + now, buried[1] + then];
-        }
+            (crossings(grown, &body), [now, then])
+        });
+        (found, length_error(out, fur), at_rest)
+    });
+    let crossed: usize = of_frames.iter().map(|(found, ..)| found).sum();
+    let allowed: f64 = unfreed.values().sum();
+    let lengths = of_frames.iter().fold(0.0_f64, |most, (_, error, _)| most.max(*error));
+    let (mut at_rest, mut buried) = (0, [0, 0]);
+    for (crossed, [now, then]) in of_frames.iter().filter_map(|(.., at_rest)| *at_rest) {
+        at_rest += crossed;
+        buried = [buried[0] + now, buried[1] + then];
     }
     println!(
         "bear_storm: {crossed} crossings in {FRAMES} frames ({allowed} unfreed; {at_rest} at rest in 4 frames), \

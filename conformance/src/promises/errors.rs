@@ -6,6 +6,7 @@ use engine::error::ErrorKind;
 
 use crate::samples::Form;
 use crate::suite::{Findings, sound};
+use crate::threads;
 use crate::trial::{Outcome, Subject, Trial};
 
 pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Findings) {
@@ -13,16 +14,15 @@ pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mu
         check_outcome(outcome, trial.form, findings);
     }
     let frames = subject.frames();
-    for (trial, _) in sound(tried, 8) {
-        for form in Form::EXTREMES {
-            let trial = Trial { form, ..trial.clone() };
-            check_outcome(&subject.run(&trial, &frames), form, findings);
-        }
+    let extreme = sound(tried, 8).flat_map(|(trial, _)| {
+        let of_form = |form| (form, Trial { form, ..trial.clone() });
         // One empty input beside non-empty ones is as common as all of them empty.
-        for index in 0..subject.inputs.len() {
-            let trial = Trial { empty: Some(index), ..trial.clone() };
-            check_outcome(&subject.run(&trial, &frames), Form::Empty, findings);
-        }
+        let without = |index| (Form::Empty, Trial { empty: Some(index), ..trial.clone() });
+        Form::EXTREMES.into_iter().map(of_form).chain((0..subject.inputs.len()).map(without)).collect::<Vec<_>>()
+    });
+    let outcomes = threads::map(extreme, |(form, trial)| (form, subject.run(&trial, &frames)));
+    for (form, outcome) in outcomes {
+        check_outcome(&outcome, form, findings);
     }
 }
 
