@@ -5,6 +5,7 @@
 //! a window for a few frames. Parts behind a solver find its frames in the cache. The last step merges the parts.
 
 mod cut;
+pub(crate) mod expect;
 mod list;
 mod openjd;
 mod slurm;

@@ -159,7 +159,7 @@ fn div_ceil(a: i64, b: i64) -> i64 {
 }
 
 /// A node and all that it depends on.
-fn ancestors(graph: &Graph, node: usize) -> BTreeSet<usize> {
+pub(super) fn ancestors(graph: &Graph, node: usize) -> BTreeSet<usize> {
     let mut found = BTreeSet::new();
     let mut open = vec![node];
     while let Some(node) = open.pop() {

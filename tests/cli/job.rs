@@ -128,6 +128,35 @@ fn parts_behind_a_solver_take_its_frames_from_the_cache_or_step_from_a_checkpoin
 }
 
 #[test]
+fn a_job_is_explained_with_the_times_of_a_report() {
+    let bench = Bench::with_graph(HAIR);
+    let cut = bench.done(&["explain", "g.json", "--job", "--chunk", "8"]);
+    let expected = "step solve-fall: fall in 1 task of 24 frames\n\
+        step after-fall: hair, dough in 3 tasks of 8 frames, after solve-fall\n\
+        for the expected time give --times the report of a cook\n";
+    assert_eq!(cut, expected);
+    // A second for each step of the solver, half a second for each frame of hair.
+    let report = json!({"report": 1, "frames": [1, 2], "total": {"writing_ms": 0.0}, "nodes": {
+        "fall": {"cooks": 2, "wall_ms": 2000.0}, "carried": {"cooks": 2, "wall_ms": 1000.0},
+        "lump": {"cooks": 1, "wall_ms": 0.0}, "placed": {"cooks": 1, "wall_ms": 0.0},
+        "body": {"cooks": 1, "wall_ms": 0.0}, "hair": {"cooks": 1, "wall_ms": 0.0},
+    }});
+    bench.write("r.json", &report.to_string());
+    let args = ["explain", "g.json", "--job", "--chunk", "8", "--times", "r.json", "--machines", "1,3"];
+    let text = bench.done(&args);
+    let expected = "step solve-fall: fall in 1 task of 24 frames, 26.0 s each at most\n\
+        step after-fall: hair, dough in 3 tasks of 8 frames, 6.0 s each at most, after solve-fall\n\
+        without a farm 36.0 s\n1 machine 46.0 s, 0.8 times as fast\n3 machines 34.0 s, 1.1 times as fast\n\
+        each task is taken to wait, start and copy for 2 s\n";
+    assert_eq!(text, expected);
+    let json: Value = serde_json::from_str(&bench.done(&[&args[..], &["--json"]].concat())).unwrap();
+    assert_eq!(json["steps"][1]["parts"], json!(["1-8", "9-16", "17-24"]));
+    assert_eq!(json["machines"][1], json!({"machines": 3, "seconds": 34.0}));
+    let ran = bench.run(&["explain", "g.json", "--job", "--machines", "0"]);
+    assert_eq!(ran.code, Some(2), "{}", ran.stderr);
+}
+
+#[test]
 fn a_node_that_is_cooked_into_the_cache_needs_one_and_exists() {
     let bench = Bench::new();
     let ran = bench.run(&["cook", "g.json", "--node", "wind", "--no-write"]);
