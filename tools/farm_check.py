@@ -2,6 +2,7 @@
 """Runs what `convect job` writes on a Slurm of its own and with the command line of Open Job Description.
 
     farm_check.py CONVECT [--openjd PROGRAM] [--folder DIR]
+    farm_check.py CONVECT --scaling          how long a job takes on 1, 2, 4, 8 and 16 slots, instead
 
 munged, slurmctld and slurmd (Debian: slurm-wlm, munge) are started in one folder and ended again; where they are missing,
 or PROGRAM is, that half is skipped with a line that says so. Checked are three scenes: a window, a solver, and both with
@@ -112,8 +113,8 @@ class Check:
 class Slurm:
     """munged, slurmctld and slurmd with all that they write in one folder."""
 
-    def __init__(self, folder):
-        self.folder, self.daemons = folder, []
+    def __init__(self, folder, slots=None):
+        self.folder, self.daemons, self.slots = folder, [], slots or os.cpu_count()
         self.environment = os.environ | {"SLURM_CONF": str(folder / "slurm.conf")}
 
     def __enter__(self):
@@ -140,7 +141,8 @@ class Slurm:
             "JobAcctGatherType": "jobacct_gather/none", "AccountingStorageType": "accounting_storage/none",
             "SelectType": "select/cons_tres", "SelectTypeParameters": "CR_CPU", "ReturnToService": 2, "MinJobAge": 3600,
             "SchedulerType": "sched/builtin", "SchedulerParameters": "batch_sched_delay=0,sched_interval=1",
-            "NodeName": f"{host} NodeAddr=127.0.0.1 CPUs={os.cpu_count()} State=UNKNOWN",
+            "SlurmdParameters": "config_overrides",
+            "NodeName": f"{host} NodeAddr=127.0.0.1 CPUs={self.slots} State=UNKNOWN",
             "PartitionName": f"all Nodes={host} Default=YES MaxTime=INFINITE State=UP",
         }
         text = "".join(f"{name}={value}\n" for name, value in lines.items())
@@ -185,8 +187,8 @@ class Slurm:
         lines = self.ask("scontrol", "show", "job", "--oneliner").splitlines()
         return [dict(re.findall(r"(\S+?)=(\S*)", line)) for line in lines if line.startswith("JobId=")]
 
-    def submit(self, check, script, out):
-        environment = self.environment | {"CONVECT": check.convect, "SBATCH_OPTIONS": f"--output={out}/log.%A.%a"}
+    def submit(self, check, script, out, program=None):
+        environment = self.environment | {"CONVECT": program or check.convect, "SBATCH_OPTIONS": f"--output={out}/log.%A.%a"}
         done = subprocess.run(["bash", script], env=environment, capture_output=True, text=True, cwd=check.folder)
         check.expect(done.returncode == 0, f"{out.name}: submitted {done.stderr}")
 
@@ -285,11 +287,41 @@ def run_openjd(check, openjd, template, job, out):
     return subprocess.run(list(map(str, command)), capture_output=True, text=True)
 
 
+def scaling(check):
+    """Prints how long a job of 16 parts takes, of which each takes 2 s on one slot; and one that cooks."""
+    storm = GRAPHS / "bear_storm" / "bear_storm.json"
+    waits, cooks = check.folder / "waits", check.folder / "cooks"
+    waits.write_text('#!/bin/bash\n[ "$1" = merge ] || sleep 2\n')
+    cooks.write_text(f'#!/bin/bash\n[ "$1" = merge ] && exec {check.convect} "$@"\nexec {check.convect} "$@" --threads 1\n')
+    waits.chmod(0o755), cooks.chmod(0o755)
+    print("| slots | parts that wait 2 s | as fast | parts that cook, one thread each | as fast |\n|---|---|---|---|---|")
+    first = {}
+    for slots in (1, 2, 4, 8, 16):
+        cells = []
+        for program, job in [(waits, Job("waits", storm, [], (1, 320), 20)), (cooks, Job("cooks", storm, [], (1, 80), 20))]:
+            if program == cooks and slots > os.cpu_count():
+                cells += ["", ""]
+                continue
+            folder = check.folder / f"{job.name}.{slots}"
+            with Slurm(folder / "daemons", slots) as slurm:
+                script = check.write(job, "slurm", folder / "job")
+                began = time.monotonic()
+                slurm.submit(check, script, folder / "job", program)
+                while not all(task["JobState"] in ENDED for task in slurm.tasks()):
+                    time.sleep(0.1)
+                seconds = time.monotonic() - began
+                states = {task["JobState"] for task in slurm.tasks()}
+                check.expect(states == {"COMPLETED"}, f"{folder.name}: all tasks are done")
+            cells += [f"{seconds:.1f} s", f"× {first.setdefault(program, seconds) / seconds:.1f}"]
+        print(f"| {slots} | {' | '.join(cells)} |", flush=True)
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("convect", type=Path)
     parser.add_argument("--openjd", default="openjd", help="the program `openjd`")
     parser.add_argument("--folder", type=Path, help="where to work; kept afterwards")
+    parser.add_argument("--scaling", action="store_true", help="measure instead")
     args = parser.parse_args()
     folder = args.folder.resolve() if args.folder else Path(tempfile.mkdtemp())
     check = Check(args.convect.resolve(), folder)
@@ -305,6 +337,9 @@ def main():
     slurm = all(shutil.which(name) or Path(f"/usr/sbin/{name}").exists() for name in ("munged", "slurmctld", "slurmd", "sbatch"))
     openjd = shutil.which(args.openjd)
     try:
+        if args.scaling:
+            scaling(check)
+            return bool(check.faults)
         if slurm or openjd:
             for job in jobs:
                 check.cook_whole(job)

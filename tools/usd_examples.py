@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Cooks some frames of every example graph as USD and opens the files in usd-core, or in Blender.
 
-    usd_examples.py CONVECT [--bpy PYTHON] [--frames 1-2]      needs usd-core and numpy; PYTHON is one with bpy
+    usd_examples.py CONVECT [--bpy PYTHON] [--frames 1-2] [--folder DIR]      needs usd-core and numpy; PYTHON has bpy
 
 The check of each file is that of `usd_check.py`, against the json frames of the same cook. Without --bpy files are opened in
 usd-core, with it in Blender (bpy 5.2 from PyPI needs Python 3.13), too. Exit code 0 means that all files are right.
@@ -22,9 +22,11 @@ def main():
     parser.add_argument("convect", type=Path)
     parser.add_argument("--bpy", help="a Python with bpy")
     parser.add_argument("--frames", default="1-2")
+    parser.add_argument("--folder", type=Path, help="where to cook; kept afterwards")
     args = parser.parse_args()
     began, wrong, files = time.monotonic(), [], []
     with tempfile.TemporaryDirectory() as folder:
+        folder = str(args.folder.resolve()) if args.folder else folder
         for graph in sorted(ROOT.glob("graphs/*/*.json")):
             if graph.stem != graph.parent.name:
                 continue

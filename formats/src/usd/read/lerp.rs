@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn halves_are_rounded_as_usd_rounds_them() {
         // 1 + 2⁻¹⁰ is the half after 1. A quarter of the way to it rounds to 1; of a vector each product is rounded.
-        let next = 1.0 + 2.0_f32.powi(-10);
+        let next = 1.0 + 1.0_f32 / 1024.0;
         let scalar = arrays(Array::F1(vec![1.0]), &Array::F1(vec![next]), 0.25, true);
         assert_eq!(scalar, Array::F1(vec![1.0]));
         let pair = arrays(Array::F2(vec![[-3.0, 1.0]]), &Array::F2(vec![[1.0, next]]), 0.75, true);
