@@ -112,6 +112,10 @@ pub fn run(args: &CookArgs) -> Result<(), Failure> {
         return Err(load::faulty(&args.graph, &faults));
     }
     let staged = Staged::of(&args.pictures, &graph, &request);
+    if staged.is_some() && !args.nodes.is_empty() {
+        let line = "--node cooks no output that could be drawn; leave out the pictures, or --node";
+        return Err(Failure::new(Exit::CommandLine, line));
+    }
     let pictures = staged.as_ref().map(|staged| Pictures::new(&args.pictures, staged, &args.graph, &args.out, ceiling));
     let pictures = pictures.transpose()?;
     // The pictures' guides are cooked along.

@@ -163,6 +163,9 @@ fn a_node_that_is_cooked_into_the_cache_needs_one_and_exists() {
     assert!(ran.code == Some(2) && ran.stderr.contains("--cache"), "{}", ran.stderr);
     let ran = bench.run(&["cook", "g.json", "--node", "gale", "--no-write", "--cache", "cache"]);
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(2), "the graph has no node `gale`\n"));
+    let ran = bench.run(&["cook", "g.json", "--node", "wind", "--no-write", "--cache", "cache", "--preview"]);
+    let expected = "--node cooks no output that could be drawn; leave out the pictures, or --node\n";
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(2), expected));
 }
 
 #[test]
