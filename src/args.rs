@@ -150,6 +150,11 @@ impl PartRange {
     pub fn frames(self) -> FrameSet {
         FrameSet::whole(self.0, self.1)
     }
+
+    /// Its first and its last frame.
+    pub fn ends(self) -> (i64, i64) {
+        (self.0, self.1)
+    }
 }
 
 impl FromStr for PartRange {

@@ -40,6 +40,9 @@ pub struct CookArgs {
     /// Cook only this output; repeatable
     #[arg(long = "output", value_name = "NAME")]
     outputs: Vec<String>,
+    /// Cook this node for the outputs, instead of the outputs, and keep its results in the cache, where a cook of the same outputs finds them; repeatable
+    #[arg(long = "node", value_name = "ID", requires = "cache", requires = "no_write")]
+    nodes: Vec<String>,
     /// Folder to write to; created if missing
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
@@ -109,6 +112,10 @@ pub fn run(args: &CookArgs) -> Result<(), Failure> {
         return Err(load::faulty(&args.graph, &faults));
     }
     let staged = Staged::of(&args.pictures, &graph, &request);
+    if staged.is_some() && !args.nodes.is_empty() {
+        let line = "--node cooks no output that could be drawn; leave out the pictures, or --node";
+        return Err(Failure::new(Exit::CommandLine, line));
+    }
     let pictures = staged.as_ref().map(|staged| Pictures::new(&args.pictures, staged, &args.graph, &args.out, ceiling));
     let pictures = pictures.transpose()?;
     // The pictures' guides are cooked along.
@@ -146,11 +153,13 @@ fn cook(
     targets.sweep();
     let limit = args.cache_limit.map_or(u64::MAX, |size| size.0);
     let mut disk = args.cache.as_ref().map(|folder| DiskCache::open(folder, limit));
+    let nodes = load::nodes(graph, &args.nodes)?;
     let mut writers = match args.no_write {
+        true if !nodes.is_empty() => Writers::none(graph, &[], format),
         true => Writers::none(graph, &request.outputs, format),
         false => Writers::new(graph, &request.outputs, &args.out, format)?,
     };
-    if args.no_write && pictures.is_some() {
+    if args.no_write && (pictures.is_some() || !args.nodes.is_empty()) {
         create_folder(&args.out)?;
     }
     // Before the cook, so that an invalid path is reported at once.
@@ -168,7 +177,12 @@ fn cook(
         writing += watch.wall();
         Ok(())
     };
-    let cooked = engine.cook(cooked.0, cooked.1, disk.as_mut(), &cancel, &mut sink);
+    let cooked = match &mut disk {
+        Some(disk) if !nodes.is_empty() => {
+            engine.cook_nodes(graph, (request, &nodes), disk, &cancel).map_err(Stopped::Asked)
+        }
+        _ => engine.cook(cooked.0, cooked.1, disk.as_mut(), &cancel, &mut sink),
+    };
     drop(progress);
     let mut report = cooked.map_err(|stopped| match stopped {
         Stopped::Asked(error) => Failure::new(exit_of_error(&error), error.to_string()),
@@ -204,6 +218,9 @@ fn cook(
     }
     if !args.quiet {
         report.notes.iter().for_each(|note| crate::say!("note: {note}"));
+        if !nodes.is_empty() {
+            crate::say!("{}", times(request.frames.len(), report.cooking, None));
+        }
         print_summary(&report, &written, &drawn, writing, args.verbose);
     }
     outcome(args, graph, &report, &written)?;

@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 
 use crate::args::{Frames, Setting};
 use crate::failure::{Exit, Failure, exit_of_error};
+use crate::job::expect;
 use crate::report::why_not_needed;
 use crate::{load, memory};
 
@@ -30,6 +31,18 @@ pub struct ExplainArgs {
     /// Override a param (node.param=VALUE) or a control (name=VALUE): JSON or a bare word, such as wind.noise=billow; repeatable
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Setting>,
+    /// Explain how `convect job` would cut the cook, instead of the plan
+    #[arg(long, conflicts_with_all = ["frames", "outputs"])]
+    job: bool,
+    /// Frames of a part [default: as `convect job` chooses]
+    #[arg(long, value_name = "N", requires = "job", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    chunk: Option<u32>,
+    /// The report of a cook of this graph, of some frames or all; what the job will take is estimated from its times
+    #[arg(long, value_name = "REPORT", requires = "job")]
+    times: Option<PathBuf>,
+    /// Estimate for these numbers of machines
+    #[arg(long, value_name = "N,…", requires = "job", default_value = "1,10,100")]
+    machines: String,
     /// Print the plan as JSON
     #[arg(long)]
     json: bool,
@@ -57,6 +70,16 @@ pub fn run(args: &ExplainArgs) -> Result<(), Failure> {
     within_reach(&planned.frames, &graph)?;
     let rehearsed = engine.rehearse(&graph, &planned);
     let report = rehearsed.map_err(|error| Failure::new(exit_of_error(&error), error.to_string()))?;
+    if args.job {
+        let machines = expect::machines(&args.machines)?;
+        let (chunk, times) = (args.chunk.map(i64::from), args.times.as_deref());
+        let job = expect::Expected::of(&engine, (&graph, &report), chunk, &machines, times)?;
+        let text = match args.json {
+            true => serde_json::to_string_pretty(&job.to_json()).unwrap_or_default() + "\n",
+            false => job.text(),
+        };
+        return Ok(std::io::stdout().write_all(text.as_bytes())?);
+    }
     let text = match args.json {
         true => {
             let nodes: Vec<Value> = report

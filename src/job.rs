@@ -1,10 +1,11 @@
 //! `convect job`: cuts a cook into tasks and writes them for an engine that runs commands. It submits nothing.
 //!
-//! Outputs behind a solver are one task of all frames, because a solver cooks its frames in order; so are outputs that do
-//! not vary. The others are cut into parts of frames, whose length is a multiple of the spacing at which windows start, so
-//! that no part warms up a window for a few frames. The last step merges the parts.
+//! A solver is one task of all frames, because it cooks its frames in order; so are outputs that do not vary. The others
+//! are cut into parts of frames, whose length is a multiple of the spacing at which windows start, so that no part warms up
+//! a window for a few frames. Parts behind a solver find its frames in the cache. The last step merges the parts.
 
 mod cut;
+pub(crate) mod expect;
 mod list;
 mod openjd;
 mod slurm;
@@ -13,7 +14,7 @@ use std::path::PathBuf;
 
 use engine::plan::Request;
 
-use crate::args::Setting;
+use crate::args::{PartRange, Setting};
 use crate::failure::{Exit, Failure, exit_of_error};
 use crate::output::{create_folder, write_whole};
 use crate::{load, memory};
@@ -31,6 +32,9 @@ pub struct JobArgs {
     /// Folder for the job's file, and with `list` and `slurm` for its results
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
+    /// The frames to cook [default: the scene's]
+    #[arg(long, value_name = "A-B", allow_hyphen_values = true)]
+    frames: Option<PartRange>,
     /// Frames of a part [default: at least 16, a multiple of the spacing at which windows start]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     chunk: Option<u32>,
@@ -81,7 +85,13 @@ impl Job {
         for output in &step.outputs {
             args.extend(["--output".into(), output.clone()]);
         }
+        for node in &step.nodes {
+            args.extend(["--node".into(), node.clone()]);
+        }
         args.extend(["--out".into(), folder.clone(), "--cache".into(), places.cache.to_owned()]);
+        if !step.nodes.is_empty() {
+            args.push("--no-write".into());
+        }
         args.extend(["--report".into(), format!("{folder}/report.{}.json", step.name), "--quiet".into()]);
         for setting in &self.settings {
             args.extend(["--set".into(), setting.clone()]);
@@ -121,7 +131,8 @@ pub fn run(args: &JobArgs) -> Result<(), Failure> {
     let request = Request { outputs: load::outputs(&graph, &[])?, frames: frames.iter().take(cut::PLANNED).collect() };
     let report = engine.rehearse(&graph, &request);
     let report = report.map_err(|error| Failure::new(exit_of_error(&error), error.to_string()))?;
-    let cut = Cut::of(&graph, &report, args.chunk.map(i64::from));
+    let frames = args.frames.map_or((graph.scene.first, graph.scene.last), PartRange::ends);
+    let cut = Cut::of(&graph, &report, frames, args.chunk.map(i64::from));
     let job = Job {
         name: args.graph.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         graph: args.graph.clone(),
@@ -142,7 +153,8 @@ pub fn run(args: &JobArgs) -> Result<(), Failure> {
         job.cut.notes.iter().for_each(|note| crate::say!("note: {note}"));
         for step in &job.cut.steps {
             let s = if step.parts.len() == 1 { "" } else { "s" };
-            crate::say!("step {}: {} in {} task{s}", step.name, step.outputs.join(", "), step.parts.len());
+            let what = if step.nodes.is_empty() { &step.outputs } else { &step.nodes };
+            crate::say!("step {}: {} in {} task{s}", step.name, what.join(", "), step.parts.len());
         }
         crate::say!("wrote {}", path.display());
     }

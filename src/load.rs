@@ -176,6 +176,19 @@ pub fn engine(threads: usize, ceiling: Ceiling) -> Result<Engine, Failure> {
     engine.map_err(|error| Failure::new(Exit::Cook, format!("{error}; {hint}")))
 }
 
+/// The indices of the nodes with these ids.
+///
+/// # Errors
+/// If the graph has no node with one of the ids.
+pub fn nodes(graph: &Graph, ids: &[String]) -> Result<Vec<usize>, Failure> {
+    use crate::failure::Exit;
+    let index = |id: &String| {
+        let found = graph.nodes.iter().position(|node| *node.id == **id);
+        found.ok_or_else(|| Failure::new(Exit::CommandLine, format!("the graph has no node `{id}`")))
+    };
+    ids.iter().map(index).collect()
+}
+
 /// The indices of the outputs with these names; all if `names` is empty.
 ///
 /// # Errors

@@ -35,7 +35,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Usd_In",
-    1,
+    2,
     "Curves, meshes, points and tets from a USD file: grooms, animation, what convect wrote. Transforms are applied, also \
      moving ones, and unit and axes are converted to metres and Y up. Primvars become attributes: `displayColor` is `Cd`, \
      `st` is `uvw`, `widths` is `width`, `velocities` is `v`. Cubic curves enter by their control points, subdivision \

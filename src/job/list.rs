@@ -1,4 +1,5 @@
-//! A job as shell commands, one a line: those above the last may run in any order, the last merges.
+//! A job as shell commands, one a line: those above the last may run in any order, the last merges. A line that starts with
+//! # says where another order costs time.
 
 use super::{Job, Placeholders, quoted};
 
@@ -19,6 +20,12 @@ pub(super) fn text(job: &Job) -> String {
         let folder = wedge.map_or_else(|| out.clone(), |value| job.wedge_folder(&out, value));
         let places = Placeholders { graph: &graph, out: &folder, cache: &cache, wedge };
         for step in &job.cut.steps {
+            if let Some(before) = step.after {
+                cooks += &format!(
+                    "# these find in the cache what step {} cooked; before its end they cook it themselves\n",
+                    job.cut.steps[before].name
+                );
+            }
             step.labels().iter().for_each(|part| cooks += &line(job.cook(step, part, &places)));
         }
         merges += &line(job.merge(&places));

@@ -15,6 +15,9 @@ pub(super) fn text(job: &Job) -> String {
         let parameters: Vec<Value> = [Some(part), wedges.clone()].into_iter().flatten().collect();
         let mut made = script(&step.name, job.cook(step, "{{Task.Param.Part}}", &places));
         made["parameterSpace"] = json!({"taskParameterDefinitions": parameters});
+        if let Some(before) = step.after {
+            made["dependencies"] = json!([{"dependsOn": job.cut.steps[before].name}]);
+        }
         steps.push(made);
     }
     let names: Vec<Value> = job.cut.steps.iter().map(|step| json!({"dependsOn": step.name})).collect();

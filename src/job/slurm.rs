@@ -83,11 +83,13 @@ pub(super) fn text(job: &Job) -> String {
     let _ = writeln!(text, "        run {}\n        ;;\n    esac\n    exit 2\nfi", double_quoted(&job.merge(&places)));
     text += SUBMIT;
     let runs = wedges.len().max(1);
-    for step in &job.cut.steps {
+    for (at, step) in job.cut.steps.iter().enumerate() {
         let tasks = step.parts.len() * runs;
+        let behind = step.after.map(|before| format!(" --dependency=\"afterok:$step{before}\"")).unwrap_or_default();
         let _ = writeln!(
             text,
-            "id=$(submit --job-name={} --array=0-{}%50 \"$0\" task {}) || exit 1\nafter=\"$after:${{id%%;*}}\"",
+            "id=$(submit --job-name={} --array=0-{}%50{behind} \"$0\" task {}) || exit 1\n\
+             step{at}=${{id%%;*}} after=\"$after:${{id%%;*}}\"",
             quoted(&format!("{}.{}", job.name, step.name)),
             tasks - 1,
             step.name

@@ -67,6 +67,119 @@ fn the_parts_of_a_list_merge_to_the_whole() {
     }
 }
 
+/// Dough that falls, with hair that follows it.
+const HAIR: &str = r#"{
+  "convect": 1,
+  "scene": { "frames": [1, 24], "fps": 24 },
+  "nodes": {
+    "lump": { "type": "Mesh_Primitive", "params": { "shape": "sphere", "size": [0.2, 0.1, 0.2], "divisions": 4 } },
+    "placed": { "type": "Transform", "inputs": { "geometry": "lump" }, "params": { "translate": [0, 0.1, 0] } },
+    "body": { "type": "Tetrahedralize", "inputs": { "surface": "placed" } },
+    "fall": { "type": "Softbody", "inputs": { "bodies": ["body"] }, "params": { "stiffness": 3e3, "ground": true } },
+    "hair": { "type": "Curve_Scatter", "inputs": { "skin": "placed" }, "params": { "density": 1000, "length": [0.03, 0.05] } },
+    "carried": { "type": "Curve_Attach", "inputs": { "curves": "hair", "rest_skin": "placed", "skin": "fall.surface" } }
+  },
+  "outputs": { "hair": "carried", "dough": "fall.surface" }
+}"#;
+
+#[test]
+fn parts_behind_a_solver_take_its_frames_from_the_cache_or_step_from_a_checkpoint() {
+    let bench = Bench::with_graph(HAIR);
+    bench.done(&["cook", "g.json", "--out", "whole"]);
+    bench.done(&["job", "g.json", "--engine", "list", "--out", "farm", "--chunk", "8"]);
+    let list = fs::read_to_string(bench.path("farm/g.list.txt")).unwrap();
+    let lines: Vec<&str> = list.lines().collect();
+    assert_eq!(
+        lines[..3],
+        [
+            "convect cook g.json --part 1-24 --output hair --output dough --node fall --out farm/parts/1-24 --cache \
+             farm/cache --no-write --report farm/parts/1-24/report.solve-fall.json --quiet",
+            "# these find in the cache what step solve-fall cooked; before its end they cook it themselves",
+            "convect cook g.json --part 1-8 --output hair --output dough --out farm/parts/1-8 --cache farm/cache \
+             --report farm/parts/1-8/report.after-fall.json --quiet",
+        ]
+    );
+    // The solver, three parts and the merge; and the remark.
+    assert_eq!(lines.len(), 6, "{list}");
+    let steps = |report: &str| bench.read_json(report)["nodes"]["fall"]["cooks"].as_u64().unwrap();
+    run(&bench, lines[0]);
+    assert_eq!(steps("farm/parts/1-24/report.solve-fall.json"), 24);
+    assert!(!bench.path("farm/parts/1-24/dough.usdc").exists());
+    // Its frames are there: no step, though each is cheaper to make than what is usually kept.
+    run(&bench, lines[4]);
+    assert_eq!(steps("farm/parts/17-24/report.after-fall.json"), 0);
+    // Only checkpoints are there, of every eighth frame.
+    for entry in fs::read_dir(bench.path("farm/cache")).unwrap() {
+        for file in fs::read_dir(entry.unwrap().path()).unwrap() {
+            let file = file.unwrap().path();
+            if file.extension().is_none_or(|kind| kind != "checkpoint") {
+                fs::remove_file(file).unwrap();
+            }
+        }
+    }
+    run(&bench, lines[3]);
+    assert_eq!(steps("farm/parts/9-16/report.after-fall.json"), 8);
+    run(&bench, lines[2]);
+    run(&bench, lines[5]);
+    for name in ["hair", "dough"] {
+        let [whole, merged] = [format!("whole/{name}.usdc"), format!("farm/{name}.usda")];
+        assert_eq!(bench.done(&["diff", &whole, &merged]), "the same\n", "{name}");
+    }
+}
+
+#[test]
+fn a_job_is_explained_with_the_times_of_a_report() {
+    let bench = Bench::with_graph(HAIR);
+    let cut = bench.done(&["explain", "g.json", "--job", "--chunk", "8"]);
+    let expected = "step solve-fall: fall in 1 task of 24 frames\n\
+        step after-fall: hair, dough in 3 tasks of 8 frames, after solve-fall\n\
+        for the expected time give --times the report of a cook\n";
+    assert_eq!(cut, expected);
+    // A second for each step of the solver, half a second for each frame of hair.
+    let report = json!({"report": 1, "frames": [1, 2], "total": {"writing_ms": 0.0}, "nodes": {
+        "fall": {"cooks": 2, "wall_ms": 2000.0}, "carried": {"cooks": 2, "wall_ms": 1000.0},
+        "lump": {"cooks": 1, "wall_ms": 0.0}, "placed": {"cooks": 1, "wall_ms": 0.0},
+        "body": {"cooks": 1, "wall_ms": 0.0}, "hair": {"cooks": 1, "wall_ms": 0.0},
+    }});
+    bench.write("r.json", &report.to_string());
+    let args = ["explain", "g.json", "--job", "--chunk", "8", "--times", "r.json", "--machines", "1,3"];
+    let text = bench.done(&args);
+    let expected = "step solve-fall: fall in 1 task of 24 frames, 26.0 s each at most\n\
+        step after-fall: hair, dough in 3 tasks of 8 frames, 6.0 s each at most, after solve-fall\n\
+        without a farm 36.0 s\n1 machine 46.0 s, 0.8 times as fast\n3 machines 34.0 s, 1.1 times as fast\n\
+        each task is taken to wait, start and copy for 2 s\n";
+    assert_eq!(text, expected);
+    let json: Value = serde_json::from_str(&bench.done(&[&args[..], &["--json"]].concat())).unwrap();
+    assert_eq!(json["steps"][1]["parts"], json!(["1-8", "9-16", "17-24"]));
+    assert_eq!(json["machines"][1], json!({"machines": 3, "seconds": 34.0}));
+    let ran = bench.run(&["explain", "g.json", "--job", "--machines", "0"]);
+    assert_eq!(ran.code, Some(2), "{}", ran.stderr);
+}
+
+#[test]
+fn a_node_that_is_cooked_into_the_cache_needs_one_and_exists() {
+    let bench = Bench::new();
+    let ran = bench.run(&["cook", "g.json", "--node", "wind", "--no-write"]);
+    assert!(ran.code == Some(2) && ran.stderr.contains("--cache"), "{}", ran.stderr);
+    let ran = bench.run(&["cook", "g.json", "--node", "gale", "--no-write", "--cache", "cache"]);
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(2), "the graph has no node `gale`\n"));
+    let ran = bench.run(&["cook", "g.json", "--node", "wind", "--no-write", "--cache", "cache", "--preview"]);
+    let expected = "--node cooks no output that could be drawn; leave out the pictures, or --node\n";
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(2), expected));
+}
+
+#[test]
+fn a_job_of_some_frames_cooks_these() {
+    let bench = Bench::with_graph(HAIR);
+    bench.done(&["job", "g.json", "--engine", "openjd", "--chunk", "8", "--frames", "3-12"]);
+    let template: Value = serde_json::from_str(&fs::read_to_string(bench.path("out/g.openjd.yaml")).unwrap()).unwrap();
+    let range = |step: usize| template["steps"][step]["parameterSpace"]["taskParameterDefinitions"][0]["range"].clone();
+    assert_eq!([range(0), range(1)], [json!(["3-12"]), json!(["3-10", "11-12"])]);
+    assert_eq!(template["steps"][1]["dependencies"], json!([{"dependsOn": "solve-fall"}]));
+    let merge = template["steps"][2]["script"]["actions"]["onRun"]["args"].as_array().unwrap();
+    assert!(merge.contains(&json!("3-12")), "{merge:?}");
+}
+
 #[test]
 fn a_merge_demands_every_frame_once() {
     let bench = Bench::new();

@@ -13,6 +13,7 @@ use engine::graph::{Body, Graph, GraphOutput, Link, probe};
 use engine::node::{Arity, Cook, Node};
 use engine::param::{ParamSpec, Value};
 use engine::time::Frame;
+use formats::usd::{Flavour, UsdWriter};
 
 use crate::page::{self, Outcome};
 use crate::shapes::{block, cuboid};
@@ -162,6 +163,21 @@ fn graph(node: &Node, extra: &str) -> Result<Graph, String> {
     Ok(graph)
 }
 
+/// The params of a node that reads a file, and the folder where that is: the inputs of the others, as a row changes them.
+fn files(node: &Node, change: Change) -> (Option<tempfile::TempDir>, String) {
+    if node.name != "Usd_In" {
+        return (None, String::new());
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("inputs.usdc");
+    let mut writer = UsdWriter::create(&path, Flavour::Usdc, "inputs", 24.0, [0.0; 3]).unwrap();
+    let parts = inputs().into_iter().map(|(_, kind, part)| changed(part, kind, change));
+    let geometry = parts.fold(Geometry::default(), Geometry::with);
+    writer.frame(1.0, &geometry).unwrap();
+    writer.finish().unwrap();
+    (Some(folder), format!(r#""file": {:?}"#, path.display().to_string()))
+}
+
 /// A component as a row changes it.
 fn changed(mut part: Component, kind: Kind, change: Change) -> Component {
     match change {
@@ -285,9 +301,9 @@ fn reads(node: &Node, kind: Option<Kind>) -> bool {
 
 fn rows() {
     let mut wrong = Vec::new();
-    // What reads USD has no value to begin with: files are tested by formats.
-    for node in convect::CATALOGUE.nodes().filter(|node| node.name != "Usd_In") {
-        let plain = graph(node, "").map(|graph| cook(graph, node, Change::Nothing, 1));
+    for node in convect::CATALOGUE.nodes() {
+        let (_folder, params) = files(node, Change::Nothing);
+        let plain = graph(node, &params).map(|graph| cook(graph, node, Change::Nothing, 1));
         match plain.as_ref().map(judged) {
             Ok(Ok((Outcome::Finite | Outcome::Capped, _))) => {}
             Ok(Ok((_, said)) | Err(said)) => wrong.push(format!("{} as it is: {said}", node.name)),
@@ -295,10 +311,11 @@ fn rows() {
         }
         for (number, what, kind, change) in ROWS {
             let is_rate = matches!(change, Change::Rate(_));
-            if !(reads(node, kind) || is_rate) {
+            let (folder, params) = files(node, change);
+            if !(reads(node, kind) || is_rate || folder.is_some()) {
                 continue;
             }
-            let Ok(graph) = graph(node, "") else { continue };
+            let Ok(graph) = graph(node, &params) else { continue };
             let case = format!("{}: {what}", node.name);
             let cooked = cook(graph.clone(), node, change, 1);
             if cooked != cook(graph, node, change, 3) {
@@ -333,13 +350,14 @@ fn is_dear(spec: &ParamSpec, end: &Value) -> bool {
 
 fn ends() {
     let mut wrong = Vec::new();
-    // What reads USD has no value to begin with: files are tested by formats.
-    for node in convect::CATALOGUE.nodes().filter(|node| node.name != "Usd_In") {
+    for node in convect::CATALOGUE.nodes() {
+        let (_folder, file) = files(node, Change::Nothing);
         let (mut accepted, mut refused) = (0, Vec::new());
         for spec in node.param_specs().iter().filter(|spec| !needed(node.name).contains(spec.name)) {
             for RangeEnd { inside, outside } in range_ends(spec) {
                 let (Some(at_end), Some(beyond)) = (json(&inside), json(&outside)) else { continue };
-                let set = |text: &str| graph(node, &format!(r#""{}": {text}"#, spec.name));
+                let more = if file.is_empty() { String::new() } else { format!("{file}, ") };
+                let set = |text: &str| graph(node, &format!(r#"{more}"{}": {text}"#, spec.name));
                 if set(&beyond).is_ok() {
                     wrong.push(format!("{}: `{}` takes {beyond}, which is out of range", node.name, spec.name));
                 }

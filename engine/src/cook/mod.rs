@@ -136,6 +136,28 @@ impl Engine {
         self.pool.install(|| Sweep::new(self, &plan, Executor::Cook, disk, cancel).run(sink))
     }
 
+    /// Cooks `nodes` (indices in [`Graph::nodes`]) for a request instead of its outputs, and keeps their results on disk,
+    /// where a cook of the same outputs finds them. Nothing is delivered.
+    ///
+    /// # Errors
+    /// Where the request cannot be cooked at all.
+    pub fn cook_nodes(
+        &self,
+        graph: &Graph,
+        (request, nodes): (&Request, &[usize]),
+        disk: &mut DiskCache,
+        cancel: &AtomicBool,
+    ) -> Result<Report, Arc<CookError>> {
+        let plan = self.plan(graph, request)?;
+        let mut nothing = |_: &[Delivered]| -> Result<(), std::convert::Infallible> { Ok(()) };
+        let sweep = || Sweep::new(self, &plan, Executor::Cook, Some(disk), cancel).until(nodes).run(&mut nothing);
+        match self.pool.install(sweep) {
+            Ok(report) => Ok(report),
+            Err(Stopped::Asked(error)) => Err(error),
+            Err(Stopped::Sink(never)) => match never {},
+        }
+    }
+
     /// Cooks a plan that the caller keeps. With `reload`, the state of every solver is serialised and read back after each
     /// step: a check that checkpoints are complete, as it must not change a bit of the results.
     ///

@@ -100,6 +100,8 @@ pub(super) struct Sweep<'p, 'g, 'e> {
     plan: &'p Plan<'g>,
     executor: Executor,
     disk: Option<&'e mut DiskCache>,
+    /// Nodes whose results are made and kept, instead of the outputs; empty: the outputs.
+    until: Vec<usize>,
     cancel: &'p AtomicBool,
     keys: Keys<'p, 'g>,
     nodes: Vec<NodeRun<'p>>,
@@ -165,6 +167,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             plan,
             executor,
             disk: disk.filter(|_| !given),
+            until: Vec::new(),
             cancel,
             keys: Keys::new(plan, cancel),
             nodes: (0..plan.graph.nodes.len()).map(|index| NodeRun::new(plan, index, cancel)).collect(),
@@ -177,6 +180,12 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             frame_time: None,
             report: Report { notes: plan.graph.notes.clone(), ..Report::default() },
         }
+    }
+
+    /// Makes the results of these nodes and keeps them on disk, whatever they cost, and delivers nothing.
+    pub(super) fn until(mut self, nodes: &[usize]) -> Self {
+        self.until = nodes.to_vec();
+        self
     }
 
     pub(super) fn run<E: Send>(mut self, sink: &mut Sink<'_, E>) -> Result<Report, Stopped<E>> {
@@ -254,10 +263,13 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
     /// Cooks some frames of all outputs of the request.
     fn slice(&mut self, frames: &[Frame]) -> Vec<Delivered> {
         let watch = Stopwatch::start();
-        let (mut finished, missing) = self.find_on_disk(frames);
+        let (mut finished, missing) = match self.until.is_empty() {
+            true => self.find_on_disk(frames),
+            false => (Vec::new(), Vec::new()),
+        };
         let reads =
             missing.iter().flat_map(|(output, frame, _)| self.plan.delivery(*output, *frame).all().collect::<Vec<_>>());
-        let targets: Vec<Read> = reads.collect();
+        let targets: Vec<Read> = reads.chain(self.reads_until(frames)).collect();
         self.warm_up_chains(&targets);
         let demand = self.collect_demand(&targets, &[], Lookahead::Whole);
         let peak = self.cook_slice(demand, &targets, frames);
@@ -265,7 +277,9 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             return finished;
         }
         self.frame_bytes = self.frame_bytes.max(peak / frames.len().max(1));
-        let mut cooked: Vec<Frame> = missing.iter().map(|(_, frame, _)| *frame).collect();
+        self.record_errors_until(&targets);
+        let of_nodes = frames.iter().filter(|_| !self.until.is_empty()).copied();
+        let mut cooked: Vec<Frame> = missing.iter().map(|(_, frame, _)| *frame).chain(of_nodes).collect();
         cooked.dedup();
         if !cooked.is_empty() {
             self.frame_time = Some(watch.wall() / cooked.len() as u32);

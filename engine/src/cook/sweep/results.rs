@@ -11,6 +11,7 @@ use crate::cook::disk::KeptMetric;
 use crate::cook::store::Cooked;
 use crate::geometry::Kind;
 use crate::key::ContentKey;
+use crate::plan::Read;
 use crate::time::Frame;
 
 /// What a sweep knows of a node's results and states on disk.
@@ -73,8 +74,9 @@ impl Sweep<'_, '_, '_> {
             let Some(Ok(cooked)) = self.nodes[node].results.get(frame).cloned() else { continue };
             let bytes = cooked.iter().map(|geometry| geometry.bytes()).sum();
             // Once and for all: a window with some of its results would start anew for the others.
-            let worth =
-                self.nodes[node].on_disk.is_kept || self.disk.as_ref().is_some_and(|disk| disk.is_worth(cost, bytes));
+            let worth = self.nodes[node].on_disk.is_kept
+                || self.until.contains(&node)
+                || self.disk.as_ref().is_some_and(|disk| disk.is_worth(cost, bytes));
             if !worth {
                 continue;
             }
@@ -85,6 +87,27 @@ impl Sweep<'_, '_, '_> {
                 disk.save_result(resolved.key, &cooked, &metrics);
             }
             self.nodes[node].on_disk.recreated_in = DiskCache::read_in(bytes);
+        }
+    }
+
+    /// Results at these frames of the nodes that are cooked instead of the outputs.
+    pub(super) fn reads_until(&self, frames: &[Frame]) -> Vec<Read> {
+        let plan = self.plan;
+        let of =
+            |node: usize| frames.iter().map(move |frame| Read { node, port: 0, frame: plan.canonical(node, *frame) });
+        self.until.iter().flat_map(|node| of(*node)).collect()
+    }
+
+    /// Records the errors of the nodes that are cooked instead of the outputs, as those of the first output.
+    pub(super) fn record_errors_until(&mut self, reads: &[Read]) {
+        if self.until.is_empty() {
+            return;
+        }
+        let output = self.plan.request.outputs.first().copied().unwrap_or_default();
+        for Read { node, frame, .. } in reads {
+            if let Some(Err(error)) = self.nodes[*node].results.get(frame).cloned() {
+                self.record_error(output, error);
+            }
         }
     }
 

@@ -2,6 +2,7 @@
 //!
 //! A rep has a type, three flags (array, in place, compressed) and 48 bits that are the value itself or where it lies.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::bytes::{Bytes, Cursor, DAMAGED};
@@ -72,6 +73,12 @@ pub(super) fn vector(kind: u8) -> Option<(Number, usize)> {
     let place = kind.checked_sub(id::VEC2D).filter(|_| kind <= id::VEC4I)?;
     let number = [Number::Double, Number::Float, Number::Half, Number::Int][usize::from(place % 4)];
     Some((number, usize::from(place / 4) + 2))
+}
+
+/// Whether a rep is of halves or vectors of them.
+pub(super) fn is_half(rep: u64) -> bool {
+    let kind = Rep::of(rep).kind;
+    kind == id::HALF || matches!(vector(kind), Some((Number::Half, _)))
 }
 
 /// A crate file's values.
@@ -198,8 +205,17 @@ impl CrateData {
         let mut cursor = self.cursor(rep.payload);
         let count = if rep.is_array { self.rows(&mut cursor, 4)? } else { cursor.count(4)? };
         let is_string = matches!(rep.kind, id::STRING | id::STRING_VECTOR);
-        let text = |index: u32| if is_string { self.string(index, tokens) } else { tokens.get(index) };
-        (0..count).map(|_| Ok(text(cursor.u32()?).into())).collect()
+        // Equal texts are one: of a damaged list, all may be. Those that do not exist are empty.
+        let mut known: BTreeMap<Option<u32>, Arc<str>> = BTreeMap::new();
+        let mut texts = Vec::with_capacity(count);
+        for _ in 0..count {
+            let index = cursor.u32()?;
+            let token = if is_string { self.strings.get(index as usize).copied() } else { Some(index) };
+            let token = token.filter(|token| (*token as usize) < tokens.ends.len());
+            let text = known.entry(token).or_insert_with(|| token.map_or("", |token| tokens.get(token)).into());
+            texts.push(text.clone());
+        }
+        Ok(texts)
     }
 
     /// Keys and reps; `None` if it is empty.

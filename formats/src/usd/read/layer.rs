@@ -164,6 +164,14 @@ impl Layer {
             Data::Text(data) => data.array(handle),
         }
     }
+
+    /// Whether the numbers of a value are halves.
+    pub(super) fn is_half(&self, handle: Handle) -> bool {
+        match &self.data {
+            Data::Crate(_) => super::crate_values::is_half(handle),
+            Data::Text(_) => super::text::is_half(handle),
+        }
+    }
 }
 
 /// A reference to another file, to another prim of this file, or to another prim of another file.

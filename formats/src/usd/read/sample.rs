@@ -101,13 +101,14 @@ impl Sampled {
             Self::Nothing => Ok(None),
             Self::At(source) => source.array().map(Some),
             Self::Between { lower, upper, share } => {
+                let are_halves = lower.layer.is_half(lower.handle);
                 let lower = lower.array()?;
                 Ok(Some(match lower {
                     // These are held.
                     Array::I1(_) | Array::I2(_) | Array::I3(_) | Array::I4(_) | Array::Long(_) | Array::Texts(_) => {
                         lower
                     }
-                    _ => super::lerp::arrays(lower, &upper.array()?, share.share),
+                    _ => super::lerp::arrays(lower, &upper.array()?, share.share, are_halves),
                 }))
             }
         }

@@ -56,6 +56,11 @@ impl TextData {
     }
 }
 
+/// Whether a handle is of halves or vectors of them.
+pub(super) fn is_half(handle: Handle) -> bool {
+    matches!(TextType::of((handle >> 56) as u8).scalar, Scalar::Half)
+}
+
 fn value(lexer: &mut Lexer<'_>, kind: TextType) -> Result<Value> {
     let next = lexer.peek();
     let before = *lexer;
