@@ -206,10 +206,10 @@ impl KeepOut<'_> {
             obstacles,
             skin: None,
             method: ContactMethod::Exact,
-            coherence: 0.0,
-            gap: self.gap,
+            coherence: 0.0.into(),
+            gap: self.gap.into(),
             // Lifts nothing without a skin; it says whether the start of a curve is tested.
-            offset_root: if lifted { self.gap } else { 0.0 },
+            offset_root: if lifted { self.gap } else { 0.0 }.into(),
             offset_scale: None,
             loft: 0.0.into(),
             at_rest: None,
@@ -249,7 +249,7 @@ fn look_up_task(first: usize, starts: &[u32], how: &KeepOut<'_>, out: &mut [Half
         let root = to_f32(how.root(curve, cvs.start));
         how.write_rest(curve, cvs, root, &mut rest);
         if rest.len() >= 2 && is_finite(&rest) {
-            *out = HalfSpace::of(&rest, &DVec3::zeros(), 0.0, &collision);
+            *out = HalfSpace::of(&rest, &DVec3::zeros(), 0.0, how.gap, &collision);
         }
     }
 }
@@ -278,16 +278,14 @@ fn entering_task(
     for curve in curves {
         let cvs = starts[curve] as usize..starts[curve + 1] as usize;
         let now = &points[cvs.clone()];
-        if now.len() < 2 || !is_finite(now) {
+        if now.len() < 2 {
             continue;
         }
         let root = how.root(curve, cvs.start);
         let lifted = (to_f64(now[0]) - root).norm() >= LIFTED * how.gap;
         let untested = how.untested(lifted);
         let known = half_spaces.get(curve).zip(Some(root));
-        if let Some(known) = &known
-            && is_clear(known, now, tested_start(now, untested))
-        {
+        if known.as_ref().is_some_and(|known| known.0.clears_curve(&known.1, now, untested)) || !is_finite(now) {
             continue;
         }
         rest.resize(now.len(), [0.0; 3]);
@@ -320,18 +318,6 @@ fn rounding_of(a: Vec3, b: Vec3) -> f64 {
 #[inline(always)]
 fn is_free((half_space, root): &(&HalfSpace, DVec3), a: Vec3, b: Vec3) -> bool {
     half_space.clears(root, [&to_f64(a), &to_f64(b)], rounding_of(a, b))
-}
-
-/// Whether all of a curve from `start` in its first segment on (`None`: from the second) is in its half-space.
-#[inline(always)]
-fn is_clear(known: &(&HalfSpace, DVec3), cvs: &[Vec3], start: Option<Vec3>) -> bool {
-    for k in 0..cvs.len() - 1 {
-        let Some(from) = (if k == 0 { start } else { Some(cvs[k]) }) else { continue };
-        if !is_free(known, from, cvs[k + 1]) {
-            return false;
-        }
-    }
-    true
 }
 
 /// Where the tested part of a curve starts; `None` if its first segment is not tested.

@@ -15,8 +15,8 @@ fn kept_heights(fur: &kept::Fur, share: f64, error: f64) -> (usize, f64) {
     let how = Collide {
         skin: Some(skin),
         offset_scale: Some(share.into()),
-        offset_root: 0.0,
-        gap: 1e-6,
+        offset_root: 0.0.into(),
+        gap: 1e-6.into(),
         ..hairs::on(&obstacles)
     };
     let out = collide(&fur.starts, &fur.rest, &fur.goal, &how);
@@ -58,17 +58,18 @@ fn loft_keeps_its_share_of_heights_over_the_root_and_leaves_what_is_higher() {
     let normals = normals(&points, &triangles);
     let skin = SkinSurface { tree: &tree, triangles: &triangles, normals: &normals };
     let obstacles = [&tree];
-    let how = Collide { skin: Some(skin), offset_root: 0.0, ..hairs::on(&obstacles) };
+    let how = Collide { skin: Some(skin), offset_root: 0.0.into(), ..hairs::on(&obstacles) };
     let up = DVec3::y();
     for share in [0.1, 0.5, 1.0] {
         let how = Collide { loft: share.into(), ..how.clone() };
         let kept = at_rest(&fur.starts, &fur.rest, &how);
         let (mut lofted, mut same, mut goals) = (0, 0, Vec::new());
         for (curve, ends) in fur.starts.windows(2).enumerate() {
-            assert!((kept.up(curve) - up).norm() < 1e-12);
+            let around = kept.around(curve);
+            assert!(around.is_some_and(|around| (around.up - up).norm() < 1e-12));
             let cvs = ends[0] as usize..ends[1] as usize;
             let (rest, goal) = (&fur.rest[cvs.clone()], &fur.goal[cvs]);
-            let hair = Hair { first: 0, shift: DVec3::zeros(), half_space: None, up, rest, goal, out: &mut [] };
+            let hair = Hair { first: 0, shift: DVec3::zeros(), half_space: None, around, rest, goal, out: &mut [] };
             hair.set_goals(&how, &DVec3::zeros(), &mut goals);
             let mut all_kept = true;
             for k in 1..goal.len() {
@@ -77,7 +78,7 @@ fn loft_keeps_its_share_of_heights_over_the_root_and_leaves_what_is_higher() {
                 let height = |p: DVec3, root: Vec3| p.y - f64::from(root[1]);
                 let wanted = share * height(to_f64(rest[k]), rest[0]);
                 let before = height(goals[k - 1], goal[0]);
-                let unraised = (to_f64(goal[k]) - goals[k - 1]).normalize().y * length;
+                let unraised = f64::from(goal[k][1]) - f64::from(goal[k - 1][1]);
                 if wanted > 0.0 && before + unraised < wanted {
                     // Straight up where the segment is too short.
                     let reached = wanted.min(before + length);
@@ -93,7 +94,12 @@ fn loft_keeps_its_share_of_heights_over_the_root_and_leaves_what_is_higher() {
         assert!(lofted > 50 && same > 5, "{share}: {lofted}, {same}");
     }
     let with = |loft: f64, coherence: f64| {
-        collide(&fur.starts, &fur.rest, &fur.goal, &Collide { loft: loft.into(), coherence, ..how.clone() })
+        collide(
+            &fur.starts,
+            &fur.rest,
+            &fur.goal,
+            &Collide { loft: loft.into(), coherence: coherence.into(), ..how.clone() },
+        )
     };
     assert_eq!(with(0.3, 1.0), with(0.0, 1.0));
     assert_ne!(with(0.3, 0.0).points, with(0.0, 0.0).points);
