@@ -13,9 +13,9 @@
 //!   skin by a continuous map, and lets them take a free direction however they get there: on the bear, in wind that moves
 //!   0.50 % of all curves by more than a quarter of their length in a frame, collision raises that to 1.07 %, and to
 //!   0.63 % at `coherence` 1 (tests/wind/coherence.rs); docs/wind.md has other bodies.
-//! * `loft` keeps a share of the height of what the wind presses down, which first contact lays on the skin. It is 0 by
-//!   default: by the tangent plane of the root alone it makes fur stand off where the wind blows against a curved skin, and
-//!   twice to five times as many tips jump (docs/wind.md).
+//! * `loft` keeps a share of the height of what the wind presses down, which first contact lays on the skin. Heights
+//!   are those over the skin as it curves at the root: over its tangent plane fur would stand off a curved skin. It is 0 by
+//!   default: on smooth bodies a third fewer tips jump with it, on the bear a third more do (docs/wind.md).
 //! * A segment may be carried to where no turn about its CV frees it, which W leaves open. Then the whole curve is blended
 //!   towards rest, up to its first pose that crosses nothing.
 //! * `offset_scale` only raises segments that would lie lower: wind may lift fur off the skin.
@@ -57,15 +57,15 @@ params! { PARAMS:
         "How far outside the skin each root is moved, together with its curve: in a crease this far from all its faces, if \
          a move of 4 times this distance reaches that. If this is less than `gap`, the \
          beginning of a curve is not tested, because it touches the skin.")
-        .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
+        .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.1);
     OFFSET_SCALE: Param<Maskable> = Param::maskable("offset_scale", -1.0,
         "Minimum height above the skin, relative to the height at rest: 1 keeps the volume of the coat, smaller values \
          let the wind press it down. Negative values turn this off.")
         .soft(-1.0, 1.0);
     LOFT: Param<Maskable> = Param::maskable("loft", 0.0,
-        "Share of its height at rest, above the tangent plane of the skin at its root, that a CV keeps which the wind blows \
-         below it: a little keeps a coat from lying on the skin. Where the wind blows against the skin such fur stands off \
-         it, and jumps more often as the wind turns. `coherence` scales it by 1 − its own value. 0 is the paper's.")
+        "Share of its height at rest, above the skin as it curves away from the root, that a CV keeps which the wind blows \
+         below it: a little keeps a coat from lying on the skin, so that far fewer curves touch it. On most bodies fewer \
+         jump as the wind turns. `coherence` scales it by 1 − its own value. 0 is the paper's.")
         .within(0.0, 1.0).when(|params| {
             let coherence = params.get(COHERENCE);
             params.get(OFFSET_SCALE).value < 0.0 && (coherence.value < 1.0 || coherence.attribute.is_some())
@@ -139,7 +139,7 @@ const MANY: f64 = 20.0;
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Collision",
-    6,
+    7,
     "Keeps curves that are bent by wind out of colliders. Each segment, root to tip, turns from its rest direction \
      towards the direction that the wind gave it, until it touches a collider. Place this node after the wind, and \
      wire the curves from before the wind into `rest`. Of each curve, `unfreed` is the number of segments that still \
