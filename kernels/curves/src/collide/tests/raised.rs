@@ -104,3 +104,33 @@ fn loft_keeps_its_share_of_heights_over_the_root_and_leaves_what_is_higher() {
     assert_eq!(with(0.3, 1.0), with(0.0, 1.0));
     assert_ne!(with(0.3, 0.0).points, with(0.0, 0.0).points);
 }
+
+/// The surface around a root of a sphere drops as the sphere does, to second order; in a bowl it does not drop.
+#[test]
+fn the_surface_around_a_root_curves_as_the_skin() {
+    use super::root_surface::RootSurface;
+    let sphere = numerics::shapes::icosphere(1.0, 4);
+    let points: Vec<Vec3> = sphere.points.iter().map(|p| p.map(|x| 2.0 * x as f32)).collect();
+    let triangles = sphere.triangles();
+    for (triangles, inwards) in
+        [(triangles.clone(), false), (triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect(), true)]
+    {
+        let tree = TriangleTree::build(&points, &triangles);
+        let normals = normals(&points, &triangles);
+        let skin = SkinSurface { tree: &tree, triangles: &triangles, normals: &normals };
+        for seed in 0..40 {
+            let key = numerics::random::Key::new(seed);
+            let out = DVec3::from_fn(|axis, _| key.of(axis as u64).f64() - 0.5).normalize();
+            let around = RootSurface::of(&skin, &(out * 2.0), 0.8).unwrap();
+            let side = perpendicular(&around.up, &DVec3::new(0.3, 0.5, 0.7));
+            let (along, up) = (side * 0.4, around.up);
+            // On the sphere of radius 2, 0.4 aside: 0.0404 below the tangent plane.
+            let expected = if inwards { 0.0 } else { 0.04 };
+            assert!((around.height(&along) - expected).abs() < 4e-3, "{seed}: {}", around.height(&along));
+            let step = |slope: f64| (side - up * slope).normalize() * 0.4;
+            let lofted = around.lofted(&DVec3::zeros(), &step(0.5), &(up * 0.4), 0.02).unwrap();
+            assert!((around.height(&lofted) - 0.02).abs() < 1e-3 && (lofted.norm() - 0.4).abs() < 1e-9, "{seed}");
+            assert_eq!(around.lofted(&DVec3::zeros(), &step(-0.5), &(up * 0.4), 0.02), None);
+        }
+    }
+}
