@@ -13,9 +13,9 @@
 //!   skin by a continuous map, and lets them take a free direction however they get there: on the bear, in wind that moves
 //!   0.50 % of all curves by more than a quarter of their length in a frame, collision raises that to 1.07 %, and to
 //!   0.63 % at `coherence` 1 (tests/wind/coherence.rs); docs/wind.md has other bodies.
-//! * `loft` keeps a share of the height of what the wind presses down, which first contact lays on the skin. It is 0 by
-//!   default: by the tangent plane of the root alone it makes fur stand off where the wind blows against a curved skin, and
-//!   twice to five times as many tips jump (docs/wind.md).
+//! * `loft` keeps a share of the height of what the wind presses down, which first contact lays on the skin. Heights
+//!   are those over the skin as it curves at the root: over its tangent plane fur would stand off a curved skin. It is 0 by
+//!   default: on smooth bodies a third fewer tips jump with it, on the bear a third more do (docs/wind.md).
 //! * A segment may be carried to where no turn about its CV frees it, which W leaves open. Then the whole curve is blended
 //!   towards rest, up to its first pose that crosses nothing.
 //! * `offset_scale` only raises segments that would lie lower: wind may lift fur off the skin.
@@ -53,27 +53,30 @@ params! { PARAMS:
     ROTATION_STEPS: Param<i64> = Param::int("rotation_steps", 10, "Number of steps of a turn. With more steps \
         segments stop closer to the contact, at proportionally higher cost.")
         .within(1.0, 1e6).soft(2.0, 64.0).when(|params| params.get(METHOD) == Method::Steps);
-    OFFSET_ROOT: Param<f64> = Param::double("offset_root", 1e-4,
+    OFFSET_ROOT: Param<Maskable> = Param::maskable("offset_root", 1e-4,
         "How far outside the skin each root is moved, together with its curve: in a crease this far from all its faces, if \
          a move of 4 times this distance reaches that. If this is less than `gap`, the \
          beginning of a curve is not tested, because it touches the skin.")
-        .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
+        .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.1);
     OFFSET_SCALE: Param<Maskable> = Param::maskable("offset_scale", -1.0,
         "Minimum height above the skin, relative to the height at rest: 1 keeps the volume of the coat, smaller values \
          let the wind press it down. Negative values turn this off.")
         .soft(-1.0, 1.0);
     LOFT: Param<Maskable> = Param::maskable("loft", 0.0,
-        "Share of its height at rest, above the tangent plane of the skin at its root, that a CV keeps which the wind blows \
-         below it: a little keeps a coat from lying on the skin. Where the wind blows against the skin such fur stands off \
-         it, and jumps more often as the wind turns. `coherence` scales it by 1 − its own value. 0 is the paper's.")
-        .within(0.0, 1.0).when(|params| params.get(OFFSET_SCALE).value < 0.0 && params.get(COHERENCE) < 1.0);
-    GAP: Param<f64> = Param::double("gap", 1e-4,
+        "Share of its height at rest, above the skin as it curves away from the root, that a CV keeps which the wind blows \
+         below it: a little keeps a coat from lying on the skin, so that far fewer curves touch it. On most bodies fewer \
+         jump as the wind turns. `coherence` scales it by 1 − its own value. 0 is the paper's.")
+        .within(0.0, 1.0).when(|params| {
+            let coherence = params.get(COHERENCE);
+            params.get(OFFSET_SCALE).value < 0.0 && (coherence.value < 1.0 || coherence.attribute.is_some())
+        });
+    GAP: Param<Maskable> = Param::maskable("gap", 1e-4,
         "Distance, along the arc of its turn, at which a segment stops before a contact.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     WIDTH: Param<Maskable> = Param::maskable("width", 0.0,
         "Diameter of the curves in collisions. At 0 they are infinitely thin.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
-    COHERENCE: Param<f64> = Param::double("coherence", 0.0,
+    COHERENCE: Param<Maskable> = Param::maskable("coherence", 0.0,
         "How strongly curves blown into the skin are redirected outward, so that they do not flip from one side to the \
          other as wind and skin move. At 0 each segment stops at its first contact, which depends on all of its way: a \
          few curves in a thousand jump in each frame. At 1 there are hardly more jumps than in the wind itself (see the \
@@ -136,7 +139,7 @@ const MANY: f64 = 20.0;
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Collision",
-    6,
+    7,
     "Keeps curves that are bent by wind out of colliders. Each segment, root to tip, turns from its rest direction \
      towards the direction that the wind gave it, until it touches a collider. Place this node after the wind, and \
      wire the curves from before the wind into `rest`. Of each curve, `unfreed` is the number of segments that still \
@@ -170,7 +173,7 @@ pub(crate) static NODE: Node = Node::new(
 ])
 .leaves_out(|params, _| {
     let mut left_out = Vec::new();
-    if params.get(COHERENCE) == 0.0 {
+    if params.get(COHERENCE).value == 0.0 {
         left_out.push(LeftOut::new("redirection", "`coherence` is 0"));
     }
     if params.get(OFFSET_SCALE).value < 0.0 {
@@ -241,6 +244,7 @@ fn collided(cx: &Cx, curves: &Component, rest: &Component) -> Result<Found> {
     let skin = cx.part(SKIN).or(colliders.first().copied()).map(Surface::of);
     let blend = cx.mask(BLEND, curves)?;
     let factors = Group::of(&cx.get(GROUP), curves)?.map(|group| group.factors(blend));
+    let offset_root = cx.mask(OFFSET_ROOT, curves)?.map(f64::from);
     let mut how = Collide {
         obstacles: &obstacles,
         skin: skin.as_ref().map(Surface::skin),
@@ -248,9 +252,9 @@ fn collided(cx: &Cx, curves: &Component, rest: &Component) -> Result<Found> {
             Method::Exact => ContactMethod::Exact,
             Method::Steps => ContactMethod::Steps(cx.get(ROTATION_STEPS) as u32),
         },
-        coherence: cx.get(COHERENCE),
-        gap: cx.get(GAP),
-        offset_root: cx.get(OFFSET_ROOT),
+        coherence: cx.mask(COHERENCE, curves)?.map(f64::from),
+        gap: cx.mask(GAP, curves)?.map(f64::from),
+        offset_root,
         offset_scale: Some(cx.mask(OFFSET_SCALE, curves)?.map(f64::from)).filter(|scale| scale.value >= 0.0),
         loft: cx.mask(LOFT, curves)?.map(f64::from),
         at_rest: None,
@@ -260,7 +264,17 @@ fn collided(cx: &Cx, curves: &Component, rest: &Component) -> Result<Found> {
     let starts = curves.runs().starts();
     // Computed once for still colliders and curves.
     let tree = skin.as_ref().map(|skin| skin.tree().clone());
-    let still = Still { obstacles: trees.clone(), skin: tree, offset: how.offset_root, lofts: how.loft.value > 0.0 };
+    let at_root = |mask: &[f32]| {
+        let roots = curves.runs().ranges().map(|cvs| mask.get(cvs.start).copied().unwrap_or_default());
+        roots.collect::<Vec<f32>>()
+    };
+    let still = Still {
+        obstacles: trees.clone(),
+        skin: tree,
+        offset: how.offset_root.value,
+        offsets: offset_root.mask.map_or_else(Vec::new, at_root),
+        lofts: how.loft.value > 0.0,
+    };
     let at_rest = rest.kept(still, || Ok(at_rest(starts, rest.positions(), &how)))?;
     how.at_rest = Some(&at_rest);
     let collided = collide(starts, rest.positions(), curves.positions(), &how);
@@ -281,6 +295,8 @@ struct Still {
     obstacles: Vec<Arc<TriangleTree>>,
     skin: Option<Arc<TriangleTree>>,
     offset: f64,
+    /// What scales it at the root of each curve; empty without a mask.
+    offsets: Vec<f32>,
     lofts: bool,
 }
 
@@ -292,6 +308,7 @@ impl PartialEq for Still {
             && self.skin.iter().zip(&other.skin).all(same)
             && self.skin.is_some() == other.skin.is_some()
             && (self.offset, self.lofts) == (other.offset, other.lofts)
+            && self.offsets == other.offsets
     }
 }
 

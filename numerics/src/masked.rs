@@ -48,6 +48,17 @@ impl Masked<'_, f32> {
     }
 }
 
+impl Masked<'_, f64> {
+    /// The number at a row.
+    ///
+    /// # Panics
+    /// Where the mask has no such row.
+    #[inline(always)]
+    pub fn at(&self, row: usize) -> f64 {
+        self.value * f64::from(self.factor(row))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -57,6 +68,7 @@ mod tests {
         let masked = Masked { value: 0.5_f32, mask: Some(&[0.0, 1.0, -2.0]) };
         assert_eq!([0, 1, 2].map(|row| masked.at(row)), [0.0, 0.5, -1.0]);
         assert_eq!(Masked::uniform(0.5_f32).at(7), 0.5);
+        assert_eq!([0, 1, 2].map(|row| masked.map(f64::from).at(row)), [0.0, 0.5, -1.0]);
         assert_eq!(masked.map(f64::from).value, 0.5_f64);
     }
 }

@@ -2,7 +2,7 @@
 //! the same with deep folds, a trefoil knot and a sphere. The tables of docs/wind.md.
 //!
 //! `cargo run --release -p studies --bin coherence_study [camel|folds|knot|sphere]… [still|moving|eighths|storm]…
-//! [coherence=X]… [curves=N] [pairs=N]`. 10,000 curves of 7 CVs; wind turns by 1° a frame. Each row compares `pairs` pairs
+//! [coherence=X]… [loft=X] [curves=N] [pairs=N]`. 10,000 curves of 7 CVs; wind turns by 1° a frame. Each row compares `pairs` pairs
 //! of samples: a frame apart (still, moving), an eighth of one (eighths) or a quarter (storm). Jumps are tips that move by
 //! more than a quarter of their length; those are added whose curves do not jump in the wind alone.
 
@@ -30,6 +30,7 @@ fn main() {
         if named.is_empty() { all.to_vec() } else { named }
     };
     let (curves, pairs) = (number("curves=", 10_000.0) as usize, number("pairs=", 36.0) as usize);
+    let loft = number("loft=", 0.0);
     let mut coherences = numbers("coherence=");
     if coherences.is_empty() {
         coherences = vec![0.0, 1.0];
@@ -53,7 +54,8 @@ fn main() {
                 let samples = [0.0, step].map(|step| groom.at(case, frame + step));
                 let blown = ways(&groom, &samples[0].goal, &samples[1].goal);
                 for (coherence, sums) in coherences.iter().zip(&mut sums) {
-                    let [before, after] = [&samples[0], &samples[1]].map(|sample| collided(&groom, sample, *coherence));
+                    let [before, after] =
+                        [&samples[0], &samples[1]].map(|sample| collided(&groom, sample, *coherence, loft));
                     sums.add(&groom, &samples[0], [&before, &after], &blown);
                 }
                 wind.extend(blown);
@@ -65,16 +67,16 @@ fn main() {
     }
 }
 
-fn collided(groom: &Groom, sample: &Sample, coherence: f64) -> Collided {
+fn collided(groom: &Groom, sample: &Sample, coherence: f64, loft: f64) -> Collided {
     let how = Collide {
         obstacles: &[&sample.tree],
         skin: Some(SkinSurface { tree: &sample.tree, triangles: &groom.body.triangles, normals: &sample.normals }),
         method: ContactMethod::Exact,
-        gap: 1e-4,
-        offset_root: 1e-4,
+        gap: 1e-4.into(),
+        offset_root: 1e-4.into(),
         offset_scale: None,
-        loft: 0.0.into(),
-        coherence,
+        loft: loft.into(),
+        coherence: coherence.into(),
         at_rest: None,
         blend: 1.0.into(),
         width: 0.0.into(),

@@ -28,10 +28,10 @@ fn conforms_to_its_declaration() {
 #[test]
 fn a_hair_stops_one_gap_above_a_floor() {
     // From half its length above the floor a segment turns down to 30°, minus the gap ÷ its length.
-    for gap in [1e-4, 1e-2] {
-        let out = laid_down().input(COLLIDERS, floor(0.0)).set(GAP, gap).set(LOFT, 0.0.into()).cook();
+    for gap in [1e-4_f32, 1e-2] {
+        let out = laid_down().input(COLLIDERS, floor(0.0)).set(GAP, gap.into()).set(LOFT, 0.0.into()).cook();
         let tip = out.curves().positions()[1];
-        let angle = std::f64::consts::FRAC_PI_6 - gap;
+        let angle = std::f64::consts::FRAC_PI_6 - f64::from(gap);
         assert!((f64::from(tip[0]) - libm::cos(angle)).abs() < 1e-6, "{tip:?}");
         assert_eq!(out.metrics["contacts"], 1.0);
         assert_eq!(out.metrics["crossings_left"], 0.0);
@@ -43,15 +43,15 @@ fn all_colliders_stop_curves_and_the_first_is_the_default_skin() {
     let both = laid_down().input(COLLIDERS, floor(-5.0)).input(COLLIDERS, floor(0.0));
     let alone = laid_down().input(COLLIDERS, floor(0.0));
     assert_eq!(both.cook().curves().positions(), alone.cook().curves().positions());
-    let lifted = laid_down().input(COLLIDERS, floor(0.5)).set(OFFSET_ROOT, 0.25).cook();
+    let lifted = laid_down().input(COLLIDERS, floor(0.5)).set(OFFSET_ROOT, 0.25.into()).cook();
     assert!((lifted.curves().positions()[0][1] - 0.75).abs() < 1e-6);
-    let skin = laid_down().input(COLLIDERS, floor(-5.0)).input(SKIN, floor(0.4)).set(OFFSET_ROOT, 0.25).cook();
+    let skin = laid_down().input(COLLIDERS, floor(-5.0)).input(SKIN, floor(0.4)).set(OFFSET_ROOT, 0.25.into()).cook();
     assert!((skin.curves().positions()[0][1] - 0.65).abs() < 1e-6);
 }
 
 #[test]
 fn a_skin_without_colliders_still_lifts_roots() {
-    let out = laid_down().input(SKIN, floor(0.4)).set(OFFSET_ROOT, 0.25).cook();
+    let out = laid_down().input(SKIN, floor(0.4)).set(OFFSET_ROOT, 0.25.into()).cook();
     assert!((out.curves().positions()[0][1] - 0.65).abs() < 1e-6);
     assert_eq!(out.metrics["contacts"], 0.0);
 }
@@ -100,7 +100,7 @@ fn unfreed_counts_the_segments_of_each_curve_that_cross() {
         Component::curves(vec![3, 2], points.to_vec()).unwrap().into()
     };
     let scene = bench(&NODE).input(CURVES, curves([1.0, 0.0, 0.0])).input(REST, curves([0.0, 1.0, 0.0]));
-    let out = scene.input(COLLIDERS, cube).set(OFFSET_ROOT, 0.0).cook();
+    let out = scene.input(COLLIDERS, cube).set(OFFSET_ROOT, 0.0.into()).cook();
     assert_eq!(out.curves().get(UNFREED_SEGMENTS), Some(&[1, 0][..]));
     assert_eq!(
         ["crossings_left", "unfreed_segments", "blended_to_rest"].map(|name| out.metrics[name]),
@@ -127,7 +127,7 @@ fn roots_in_creases_are_lifted_from_both_faces_or_counted() {
         let groove: Geometry = Component::mesh(vec![4, 4], vec![0, 1, 3, 2, 0, 4, 5, 1], points).unwrap().into();
         let upright = curve(&[[0.0, 0.0, 0.0], [0.0, 0.5, 0.0]]);
         let scene = bench(&NODE).input(CURVES, upright.clone()).input(REST, upright).input(COLLIDERS, groove);
-        let out = scene.set(OFFSET_ROOT, 0.01).cook();
+        let out = scene.set(OFFSET_ROOT, 0.01.into()).cook();
         let height = f64::from(out.curves().positions()[0][1]);
         let slope = f64::from(side);
         let sine = slope / (1.0 + slope * slope).sqrt();
@@ -147,7 +147,10 @@ fn loft_keeps_a_share_of_the_height_of_a_curve_blown_flat() {
     }
     // `coherence` scales it, `offset_scale` replaces it.
     let height = |bench: Bench| bench.cook().curves().positions()[1];
-    assert_eq!(height(blown().set(LOFT, 0.5.into()).set(COHERENCE, 1.0)), height(blown().set(COHERENCE, 1.0)));
+    assert_eq!(
+        height(blown().set(LOFT, 0.5.into()).set(COHERENCE, 1.0.into())),
+        height(blown().set(COHERENCE, 1.0.into()))
+    );
     assert_eq!(
         height(blown().set(LOFT, 0.5.into()).set(OFFSET_SCALE, 0.2.into())),
         height(blown().set(OFFSET_SCALE, 0.2.into()))
@@ -168,7 +171,7 @@ fn loft_and_offset_scale_may_be_masked() {
             .input(CURVES, two(flat))
             .input(REST, two(upright))
             .input(COLLIDERS, floor(0.0))
-            .set(OFFSET_ROOT, 0.0)
+            .set(OFFSET_ROOT, 0.0.into())
     };
     // A share of a height of 1 m over the root; of 1.01 m over the skin.
     let stands = |value: f32| Maskable { value, attribute: Some("stands".into()) };
@@ -177,7 +180,31 @@ fn loft_and_offset_scale_may_be_masked() {
         let heights = [1, 3].map(|cv| out.curves().positions()[cv][1] - 0.01);
         assert!((0..2).all(|k| (heights[k] - expected[k]).abs() < 1e-3), "{}: {heights:?}", param.name());
     }
-    assert_eq!(blown().set(LOFT, stands(0.0)).cook().curves().positions(), blown().cook().curves().positions());
+    let flat = [stands(0.0), 0.0.into()].map(|loft| blown().set(LOFT, loft).cook().curves().positions().to_vec());
+    assert_eq!(flat[0], flat[1]);
+}
+
+/// Each of two curves, one with half of the number, ends as if both had its number.
+#[test]
+fn coherence_gap_and_root_offset_may_be_masked() {
+    let two = |ends: [[f32; 3]; 2]| -> Geometry {
+        let points = [[0.0, 0.0, 0.0], ends[0], [0.0, 0.0, 3.0], ends[1]];
+        let mut curves = Component::curves(vec![2, 2], points.to_vec()).unwrap();
+        curves.set(Attr::<f32>::element("some"), vec![0.5, 1.0]).unwrap();
+        curves.into()
+    };
+    let cook = |param: &Param<Maskable>, value: f32, attribute: Option<Name>| {
+        let (blown, upright) = ([[0.8, -0.6, 0.0], [0.8, -0.6, 3.0]], [[0.0, 1.0, 0.0], [0.0, 1.0, 3.0]]);
+        let scene = bench(&NODE).input(CURVES, two(blown)).input(REST, two(upright)).input(COLLIDERS, floor(0.0));
+        let out = scene.set(LOFT, 0.0.into()).set(*param, Maskable { value, attribute }).cook();
+        out.curves().positions().to_vec()
+    };
+    for (param, value) in [(COHERENCE, 1.0), (GAP, 0.05), (OFFSET_ROOT, 0.05)] {
+        let masked = cook(&param, value, Some("some".into()));
+        let (half, whole) = (cook(&param, 0.5 * value, None), cook(&param, value, None));
+        assert_eq!((&masked[..2], &masked[2..]), (&half[..2], &whole[2..]), "{}", param.name());
+        assert_ne!(half, whole, "{}", param.name());
+    }
 }
 
 /// Of two curves blown through the floor the one in the group stops at it, as without a group; the other keeps its bits, and

@@ -67,8 +67,9 @@ pub(super) fn first_crossing_in(obstacles: &[&TriangleTree], a: Vec3, b: Vec3) -
     first
 }
 
+/// Replaces `first` by the first crossing with some triangles of a block, if that is nearer to `a`.
 #[inline(always)]
-fn add_crossings(block: &Block, lanes: u16, a: Vec3, b: Vec3, first: &mut Option<Crossing>) {
+pub(super) fn add_crossings(block: &Block, lanes: u16, a: Vec3, b: Vec3, first: &mut Option<Crossing>) {
     let mut lanes = lanes & may_cross(block, a, b);
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize;

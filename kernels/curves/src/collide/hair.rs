@@ -3,6 +3,7 @@
 use super::coherent_turn::WayOut;
 use super::crossing::{first_crossing, first_crossing_in};
 use super::half_space::HalfSpace;
+use super::root_surface::RootSurface;
 use super::segment_turn::{Nearby, Segment, Turned};
 use super::{Collide, Reached, perpendicular};
 use nalgebra::Quaternion;
@@ -21,8 +22,8 @@ pub(super) struct Hair<'a> {
     pub(super) shift: DVec3,
     /// Where it meets nothing, if known.
     pub(super) half_space: Option<&'a HalfSpace>,
-    /// Direction out of the skin at its root; zero where unknown.
-    pub(super) up: DVec3,
+    /// The skin around its root, for `loft`.
+    pub(super) around: Option<RootSurface>,
     pub(super) rest: &'a [Vec3],
     pub(super) goal: &'a [Vec3],
     pub(super) out: &'a mut [Vec3],
@@ -119,8 +120,8 @@ impl Hair<'_> {
         let axis = carried.axis;
         let pivot = to_f64(self.out[k]);
         let (mut to, mut way_out) = (*wanted, None);
-        if let Some(ground) = how.ground(&pivot, length) {
-            to = part_way(wanted, &ground.lead_out(&from, wanted, length), &axis, how.coherence);
+        if let Some((ground, coherence)) = how.ground(self.first + k, &pivot, length) {
+            to = part_way(wanted, &ground.lead_out(&from, wanted, length), &axis, coherence);
             way_out = Some((ground.normal, rest.unwrap_or(*wanted)));
         }
         let segment = Segment {
@@ -131,7 +132,7 @@ impl Hair<'_> {
             before: carried.before,
             length,
             half: 0.5 * f64::from(how.width.at(self.first + k)),
-            gap: how.gap,
+            gap: how.gap_at(self.first + k),
             inner: self.untested(how, k),
             rounding,
         };
@@ -141,7 +142,8 @@ impl Hair<'_> {
     /// Length at the start of the segment from CV k that is not tested.
     #[inline(always)]
     pub(super) fn untested(&self, how: &Collide<'_>, k: usize) -> f64 {
-        if k == 0 && how.offset_root < how.gap { SKIPPED_GAPS * how.gap } else { 0.0 }
+        let gap = how.gap_at(self.first);
+        if k == 0 && how.offset_root_at(self.first) < gap { SKIPPED_GAPS * gap } else { 0.0 }
     }
 
     /// Turns the segment from CV k and writes its end; returns its direction.
@@ -212,14 +214,15 @@ impl Hair<'_> {
     #[inline(always)]
     pub(super) fn set_goals(&self, how: &Collide<'_>, shift: &DVec3, goals: &mut Vec<DVec3>) {
         goals.clear();
-        let loft = how.loft.value * (1.0 - how.coherence);
-        match (how.offset_scale, &how.skin) {
-            (Some(scale), Some(skin)) => self.raise_goals(shift, goals, |k, before, step| {
+        let around = self.around.as_ref().filter(|_| how.loft.value > 0.0);
+        match (how.offset_scale, &how.skin, around) {
+            (Some(scale), Some(skin), _) => self.raise_goals(shift, goals, |k, before, step| {
                 skin.raised(self.rest[k], before, step, scale.value * self.factor(&scale, k))
             }),
-            (None, _) if loft > 0.0 && self.up != DVec3::zeros() => {
-                self.raise_goals(shift, goals, |k, before, step| {
-                    self.lofted(k, before, step, (loft * self.factor(&how.loft, k)).min(1.0))
+            (None, _, Some(around)) => {
+                self.loft_goals(around, shift, goals, |k| {
+                    let coherence = how.coherence_at(self.first + k);
+                    (how.loft.value * (1.0 - coherence) * self.factor(&how.loft, k)).min(1.0)
                 });
             }
             _ => goals.extend(self.goal.iter().map(|cv| to_f64(*cv) + shift)),
@@ -254,27 +257,20 @@ impl Hair<'_> {
         }
     }
 
-    /// The step to a goal CV, turned so that its end has a share of its rest height above the root's tangent plane; `None` if
-    /// it is that high. It is where the turn from rest to the goal passes that height: where a turn would meet a floor there.
-    /// Straight up from the goal its side would depend on nothing but rounding where the wind blows into the skin.
+    /// Goals of which none lies lower above the skin around the root than its share of the rest height: a segment whose end
+    /// would is turned from rest towards its own goal until it reaches that height, wherever its curve has been led.
     #[inline(always)]
-    fn lofted(&self, k: usize, before: &DVec3, step: &DVec3, share: f64) -> Option<DVec3> {
-        let height = |at: &DVec3, root: Vec3| self.up.dot(&(at - to_f64(root)));
-        let wanted = share * height(&to_f64(self.rest[k]), self.rest[0]);
-        let now = height(before, self.goal[0]);
-        let length = step.norm();
-        if wanted <= 0.0 || length == 0.0 || now + self.up.dot(step) >= wanted {
-            return None;
+    fn loft_goals(&self, around: &RootSurface, shift: &DVec3, goals: &mut Vec<DVec3>, share: impl Fn(usize) -> f64) {
+        let [root, rest_root] = [self.goal, self.rest].map(|cvs| to_f64(cvs[0]));
+        let mut before = root;
+        goals.push(before + shift);
+        for k in 1..self.goal.len() {
+            let step = to_f64(self.goal[k]) - to_f64(self.goal[k - 1]);
+            let rest = to_f64(self.rest[k]) - to_f64(self.rest[k - 1]);
+            let wanted = share(k) * around.height(&(to_f64(self.rest[k]) - rest_root));
+            before += around.lofted(&(before - root), &step, &rest, wanted).unwrap_or(step);
+            goals.push(before + shift);
         }
-        let rise = ((wanted - now) / length).clamp(-1.0, 1.0);
-        let goal = step / length;
-        let rest = (to_f64(self.rest[k]) - to_f64(self.rest[k - 1])).try_normalize(0.0).unwrap_or(self.up);
-        if let Some(on_way) = lowest_on_way(&rest, &goal, &self.up, rise) {
-            return Some(on_way * length);
-        }
-        let level = (goal - self.up * self.up.dot(&goal)).try_normalize(1e-9);
-        let level = level.unwrap_or_else(|| perpendicular(&self.up, &rest));
-        Some((level * (1.0 - rise * rise).sqrt() + self.up * rise) * length)
     }
 
     /// Turns each segment back towards its goal by 1 − `blend`; returns whether any turned.
@@ -311,19 +307,6 @@ pub(super) fn part_way(from: &DVec3, to: &DVec3, axis: &DVec3, share: f64) -> DV
     let n = if sine > 1e-9 { turn / sine } else { *axis };
     let (sine, cosine) = libm::sincos(share * libm::atan2(sine, cosine));
     from * cosine + n.cross(from) * sine
-}
-
-/// Where the turn from one unit vector to another sinks below the slope `rise` along `up`; `None` if it starts below.
-fn lowest_on_way(from: &DVec3, to: &DVec3, up: &DVec3, rise: f64) -> Option<DVec3> {
-    let side = (to - from * from.dot(to)).try_normalize(1e-9)?;
-    let slopes = [up.dot(from), up.dot(&side)];
-    let most = (slopes[0] * slopes[0] + slopes[1] * slopes[1]).sqrt();
-    if slopes[0] < rise || most == 0.0 {
-        return None;
-    }
-    let angle = libm::atan2(slopes[1], slopes[0]) + libm::acos((rise / most).clamp(-1.0, 1.0));
-    let (sine, cosine) = libm::sincos(angle);
-    Some(from * cosine + side * sine)
 }
 
 /// The smallest rotation from one unit vector to another; about `axis` if they are opposite.

@@ -37,15 +37,16 @@ pub(super) struct HalfSpace {
 const SHELLS: usize = 4;
 
 impl HalfSpace {
-    /// The half-space of the curve `cvs`, displaced by `shift`, whose largest diameter is `width` metres.
+    /// The half-space of the curve `cvs`, displaced by `shift`, whose largest diameter is `width` metres
+    /// and which keeps `gap` metres from contacts.
     #[inline(always)]
-    pub(super) fn of(cvs: &[Vec3], shift: &DVec3, width: f64, how: &Collide<'_>) -> Self {
+    pub(super) fn of(cvs: &[Vec3], shift: &DVec3, width: f64, gap: f64, how: &Collide<'_>) -> Self {
         let root = to_f64(cvs[0]) + shift;
         let length: f64 = cvs.windows(2).map(|ends| (to_f64(ends[1]) - to_f64(ends[0])).norm()).sum();
         // Segments of even length end a little within the distance of a shell.
         let reach_of = |shell: usize| {
             let share = if shell + 1 == SHELLS { 1.0 } else { 1.02 * (shell + 1) as f64 / SHELLS as f64 };
-            1.001 * (share * length + how.gap) + 2.0 * width
+            1.001 * (share * length + gap) + 2.0 * width
         };
         let reach = reach_of(SHELLS - 1);
         let scale = f64::from(vector::largest(to_f32(root))) + reach;
@@ -107,6 +108,46 @@ impl HalfSpace {
         let (up, from, to) = (to_f64(self.up), from - root, to - root);
         let farther = if from.norm_squared() > to.norm_squared() { from } else { to };
         up.dot(&from).min(up.dot(&to)) > self.rise(&farther, 4.0 * rounding) + 4.0 * rounding
+    }
+
+    /// Whether a curve with this root is above all obstacles near it, but for `untested` metres at its start. One with
+    /// a coordinate that is NaN or infinite is not.
+    #[inline(always)]
+    pub(super) fn clears_curve(&self, root: &DVec3, cvs: &[Vec3], untested: f64) -> bool {
+        let up = to_f64(self.up);
+        let mut largest = 0.0_f32;
+        for cv in cvs {
+            largest = largest.max(vector::largest(*cv));
+        }
+        let slack = 4.0 * ROUNDING * f64::from(largest);
+        let mut squares = [0.0; SHELLS];
+        for shell in 0..SHELLS {
+            let room = (f64::from(self.reaches[shell]) - slack).max(0.0);
+            squares[shell] = room * room;
+        }
+        let (start, first) = (to_f64(cvs[0]), to_f64(cvs[1]) - to_f64(cvs[0]));
+        let length = first.norm();
+        // The first segment is not tested if it is no longer than that.
+        let is_tested = length > untested;
+        let start = if is_tested { start + first * (untested / length) - root } else { to_f64(cvs[1]) - root };
+        let (mut height, mut square) = (up.dot(&start), start.norm_squared());
+        for cv in &cvs[if is_tested { 1 } else { 2 }..] {
+            let away = to_f64(*cv) - root;
+            let (next, next_square) = (up.dot(&away), away.norm_squared());
+            let (lower, farther) = (height.min(next), square.max(next_square));
+            let mut rise = f64::INFINITY;
+            for shell in (0..SHELLS).rev() {
+                if farther < squares[shell] {
+                    rise = f64::from(self.rises[shell]);
+                }
+            }
+            // Not if either is NaN.
+            if !(lower > rise + slack && height.is_finite() && next.is_finite()) {
+                return false;
+            }
+            (height, square) = (next, next_square);
+        }
+        true
     }
 
     /// Whether the turn of a segment, of a curve with this root, meets nothing: it stays above all obstacles by more

@@ -15,25 +15,25 @@ use super::crossing::first_crossing;
 use super::hair::SKIPPED_GAPS;
 use super::half_space::HalfSpace;
 use super::segment_turn::{Nearby, gather};
-use super::{Collide, ContactMethod, SkinSurface, collide, perpendicular};
+use super::{Collide, ContactMethod, SkinSurface, collide};
 use crate::attach::{RootPose, attach_curve, relative_stretch};
 use numerics::masked::Masked;
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
 use numerics::tree::TriangleTree;
 use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
+use settle::{Entered, settle};
 use std::ops::Range;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
+
+mod settle;
 
 /// Number of curves in a task.
 const TASK_CURVES: usize = 256;
 
 /// Number of curves that enter the skin in a task.
-const SETTLED_CURVES: usize = 64;
-
-/// Halvings of the turn between a curve's goal and where it is free.
-const HALVINGS: usize = 7;
+const SETTLED_CURVES: usize = 32;
 
 /// Height of a root, in gaps, from which on its curve is tested from its root on: from a height h a segment turns by an arc
 /// of π/2·h before it meets a plane, which is more than the gap.
@@ -175,106 +175,6 @@ fn turn_out(
     kept.crossings_left += collided.map_or(0, |collided| collided.crossings_left);
 }
 
-/// Curves that entered the skin.
-#[derive(Clone, Copy)]
-struct Entered<'a> {
-    starts: &'a [u32],
-    rest: &'a [Vec3],
-    goal: &'a [Vec3],
-    /// Where they are free, and the number of segments that cross the skin even there; none if that is known.
-    free: &'a [Vec3],
-    crossings: &'a [i32],
-    /// Length at the start of each that is not tested.
-    untested: f64,
-}
-
-kernel! {
-    /// The shapes of `curves`, as near to their goals as they stay free; `known` is a half-space of each and its root.
-    fn settle(
-        curves: Range<usize>,
-        entered: &Entered<'_>,
-        known: &[Option<(&HalfSpace, DVec3)>],
-        skin: &TriangleTree,
-    ) -> Vec<Vec3> = settle_task;
-}
-
-#[inline(always)]
-fn settle_task(
-    curves: Range<usize>,
-    entered: &Entered<'_>,
-    known: &[Option<(&HalfSpace, DVec3)>],
-    skin: &TriangleTree,
-) -> Vec<Vec3> {
-    let mut out = entered.free[entered.starts[curves.start] as usize..entered.starts[curves.end] as usize].to_vec();
-    let (base, untested) = (entered.starts[curves.start] as usize, entered.untested);
-    let (mut nearby, mut pose, mut turns) = (Nearby::default(), Vec::new(), Vec::new());
-    for curve in curves {
-        let cvs = entered.starts[curve] as usize..entered.starts[curve + 1] as usize;
-        let [rest, goal, free] = [entered.rest, entered.goal, entered.free].map(|points| &points[cvs.clone()]);
-        // Of a curve that could not be freed no pose is better.
-        if !entered.crossings.is_empty() && entered.crossings[curve] > 0 {
-            continue;
-        }
-        // No closures here: they are not compiled for the kernel's path.
-        let outside = tested_start(rest, untested);
-        turns_between(goal, free, &mut turns);
-        let (mut crossing, mut clear) = (0.0, 1.0);
-        for _ in 0..HALVINGS {
-            let share = 0.5 * (crossing + clear);
-            pose_at(goal[0], &turns, share, &mut pose);
-            if crosses(&pose, [outside, tested_start(&pose, untested)], skin, known[curve].as_ref(), &mut nearby) {
-                crossing = share;
-            } else {
-                clear = share;
-                out[cvs.start - base..cvs.end - base].copy_from_slice(&pose);
-            }
-        }
-    }
-    out
-}
-
-/// The turn of a segment in its plane.
-struct SegmentTurn {
-    /// Its direction, and the one a right angle on.
-    from: DVec3,
-    side: DVec3,
-    /// Radians.
-    angle: f64,
-    /// Metres.
-    length: f64,
-}
-
-/// The turns of segments from those of `from` to those of `to`, which keep the lengths of `from`.
-#[inline(always)]
-fn turns_between(from: &[Vec3], to: &[Vec3], turns: &mut Vec<SegmentTurn>) {
-    turns.clear();
-    for k in 0..from.len() - 1 {
-        let [along, towards] = [from, to].map(|cvs| to_f64(cvs[k + 1]) - to_f64(cvs[k]));
-        let (length, other) = (along.norm(), towards.norm());
-        if length == 0.0 || other == 0.0 {
-            turns.push(SegmentTurn { from: along, side: DVec3::zeros(), angle: 0.0, length: 1.0 });
-            continue;
-        }
-        let (from, to) = (along / length, towards / other);
-        let axis = from.cross(&to);
-        let sine = axis.norm();
-        let axis = if sine > 1e-9 { axis / sine } else { perpendicular(&from, &DVec3::zeros()) };
-        turns.push(SegmentTurn { from, side: axis.cross(&from), angle: libm::atan2(sine, from.dot(&to)), length });
-    }
-}
-
-/// The curve from `root` whose segments have turned by this share.
-#[inline(always)]
-fn pose_at(root: Vec3, turns: &[SegmentTurn], share: f64, pose: &mut Vec<Vec3>) {
-    pose.clear();
-    pose.push(root);
-    for (k, turn) in turns.iter().enumerate() {
-        let (sine, cosine) = libm::sincos(share * turn.angle);
-        let direction = turn.from * cosine + turn.side * sine;
-        pose.push(to_f32(to_f64(pose[k]) + direction * turn.length));
-    }
-}
-
 impl KeepOut<'_> {
     /// Length at the start of a curve that is not tested.
     fn untested(&self, lifted: bool) -> f64 {
@@ -306,10 +206,10 @@ impl KeepOut<'_> {
             obstacles,
             skin: None,
             method: ContactMethod::Exact,
-            coherence: 0.0,
-            gap: self.gap,
+            coherence: 0.0.into(),
+            gap: self.gap.into(),
             // Lifts nothing without a skin; it says whether the start of a curve is tested.
-            offset_root: if lifted { self.gap } else { 0.0 },
+            offset_root: if lifted { self.gap } else { 0.0 }.into(),
             offset_scale: None,
             loft: 0.0.into(),
             at_rest: None,
@@ -349,7 +249,7 @@ fn look_up_task(first: usize, starts: &[u32], how: &KeepOut<'_>, out: &mut [Half
         let root = to_f32(how.root(curve, cvs.start));
         how.write_rest(curve, cvs, root, &mut rest);
         if rest.len() >= 2 && is_finite(&rest) {
-            *out = HalfSpace::of(&rest, &DVec3::zeros(), 0.0, &collision);
+            *out = HalfSpace::of(&rest, &DVec3::zeros(), 0.0, how.gap, &collision);
         }
     }
 }
@@ -378,16 +278,14 @@ fn entering_task(
     for curve in curves {
         let cvs = starts[curve] as usize..starts[curve + 1] as usize;
         let now = &points[cvs.clone()];
-        if now.len() < 2 || !is_finite(now) {
+        if now.len() < 2 {
             continue;
         }
         let root = how.root(curve, cvs.start);
         let lifted = (to_f64(now[0]) - root).norm() >= LIFTED * how.gap;
         let untested = how.untested(lifted);
         let known = half_spaces.get(curve).zip(Some(root));
-        if let Some(known) = &known
-            && is_clear(known, now, tested_start(now, untested))
-        {
+        if known.as_ref().is_some_and(|known| known.0.clears_curve(&known.1, now, untested)) || !is_finite(now) {
             continue;
         }
         rest.resize(now.len(), [0.0; 3]);
@@ -420,18 +318,6 @@ fn rounding_of(a: Vec3, b: Vec3) -> f64 {
 #[inline(always)]
 fn is_free((half_space, root): &(&HalfSpace, DVec3), a: Vec3, b: Vec3) -> bool {
     half_space.clears(root, [&to_f64(a), &to_f64(b)], rounding_of(a, b))
-}
-
-/// Whether all of a curve from `start` in its first segment on (`None`: from the second) is in its half-space.
-#[inline(always)]
-fn is_clear(known: &(&HalfSpace, DVec3), cvs: &[Vec3], start: Option<Vec3>) -> bool {
-    for k in 0..cvs.len() - 1 {
-        let Some(from) = (if k == 0 { start } else { Some(cvs[k]) }) else { continue };
-        if !is_free(known, from, cvs[k + 1]) {
-            return false;
-        }
-    }
-    true
 }
 
 /// Where the tested part of a curve starts; `None` if its first segment is not tested.

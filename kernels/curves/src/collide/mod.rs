@@ -17,6 +17,7 @@ mod half_space;
 mod keep_out;
 mod rest;
 mod root_lift;
+mod root_surface;
 mod sector;
 mod segment_turn;
 mod skin;
@@ -55,12 +56,14 @@ pub struct Collide<'a> {
     pub skin: Option<SkinSurface<'a>>,
     /// How a turn is stopped.
     pub method: ContactMethod,
-    /// How strongly directions into the skin are redirected outwards before a segment turns, 0..1; see [`coherence`].
-    pub coherence: f64,
-    /// Arc length kept from contacts, metres.
-    pub gap: f64,
-    /// Height above the skin to which roots are lifted, metres; 0 leaves them.
-    pub offset_root: f64,
+    /// How strongly directions into the skin are redirected outwards before a segment turns, 0..1; see [`coherence`]; a mask
+    /// has one value for each CV.
+    pub coherence: Masked<'a, f64>,
+    /// Arc length kept from contacts, metres; a mask has one value for each CV.
+    pub gap: Masked<'a, f64>,
+    /// Height above the skin to which roots are lifted, metres; 0 leaves them; a mask has one value for each CV, and is read
+    /// at roots.
+    pub offset_root: Masked<'a, f64>,
     /// Raises goals to at least this multiple of the curves' height above the skin at rest; a mask has one value for each CV.
     pub offset_scale: Option<Masked<'a, f64>>,
     /// Share of its height at rest, above the root's tangent plane, that a CV's goal keeps, 0..1; scaled by
@@ -81,12 +84,29 @@ const KEPT_GAPS: f64 = 2.0;
 const MOST_KEPT: f64 = 0.25;
 
 impl Collide<'_> {
-    /// The skin that a segment is to be redirected out of, if any; its end is kept off it by more than the gap.
+    /// The skin that the segment from CV `cv` is to be redirected out of, if any, and by how much; its end is kept off it by
+    /// more than the gap.
     #[inline(always)]
-    fn ground(&self, pivot: &DVec3, length: f64) -> Option<Ground> {
-        let ground = self.skin.as_ref().filter(|_| self.coherence > 0.0)?.ground(pivot, length)?;
-        let kept = (KEPT_GAPS * self.gap).min(MOST_KEPT * length);
-        Some(Ground { height: ground.height - kept, ..ground })
+    fn ground(&self, cv: usize, pivot: &DVec3, length: f64) -> Option<(Ground, f64)> {
+        let coherence = self.coherence_at(cv);
+        let ground = self.skin.as_ref().filter(|_| coherence > 0.0)?.ground(pivot, length)?;
+        let kept = (KEPT_GAPS * self.gap_at(cv)).min(MOST_KEPT * length);
+        Some((Ground { height: ground.height - kept, ..ground }, coherence))
+    }
+
+    #[inline(always)]
+    fn coherence_at(&self, cv: usize) -> f64 {
+        at_least_0(self.coherence.at(cv)).min(1.0)
+    }
+
+    #[inline(always)]
+    fn gap_at(&self, cv: usize) -> f64 {
+        at_least_0(self.gap.at(cv))
+    }
+
+    #[inline(always)]
+    fn offset_root_at(&self, cv: usize) -> f64 {
+        at_least_0(self.offset_root.at(cv))
     }
 }
 
@@ -249,7 +269,7 @@ fn task(
             first: cvs.start,
             shift: at_rest.shift(curve),
             half_space: half_spaces.get(curve),
-            up: at_rest.up(curve),
+            around: at_rest.around(curve),
             rest: &rest[cvs.clone()],
             goal: &goal[cvs.clone()],
             out: &mut out.points[cvs.start - base..cvs.end - base],
@@ -259,6 +279,12 @@ fn task(
         reached = reached.and(one);
     }
     reached
+}
+
+/// A masked number, which may be negative, NaN or infinite, as one that is not.
+#[inline(always)]
+fn at_least_0(number: f64) -> f64 {
+    if number > 0.0 { number.min(f64::from(f32::MAX)) } else { 0.0 }
 }
 
 /// A unit vector perpendicular to the unit vector `to`: along the perpendicular part of `near`, if there is one.

@@ -3,6 +3,7 @@
 use super::Collide;
 use super::crossing::first_crossing;
 use super::half_space::{HalfSpace, SAME_SIDE};
+use super::root_surface::RootSurface;
 use super::segment_turn::{Nearby, gather};
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
@@ -36,8 +37,8 @@ pub(super) struct Grown {
     pub(super) inside: bool,
     /// Whether its root is nearer to the skin than that.
     pub(super) low: bool,
-    /// Direction out of the skin at its root; zero without `loft`.
-    pub(super) up: DVec3,
+    /// The skin around its root; none without `loft`.
+    pub(super) around: Option<RootSurface>,
 }
 
 /// Examines curves at rest. The result depends on `obstacles`, `skin` and `offset_root` of `how`, and on whether its
@@ -71,10 +72,10 @@ fn grow_task(starts: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut [Grow
             continue;
         }
         if let Some(skin) = &how.skin {
-            let lifted = skin.lift(cvs[0], how.offset_root);
+            let lifted = skin.lift(cvs[0], how.offset_root_at(ends[0] as usize));
             (grown.shift, grown.low) = (lifted.shift, lifted.low);
             if how.loft.value > 0.0 {
-                grown.up = skin.facet(&to_f64(cvs[0]), SAME_SIDE).map_or(DVec3::zeros(), |(up, _)| up);
+                grown.around = RootSurface::of(skin, &to_f64(cvs[0]), SAME_SIDE);
             }
         }
         grown.inside = crosses_any(cvs, &grown.shift, how, &mut nearby);
@@ -105,7 +106,13 @@ fn look_up_task(
         let cvs = starts[first + k] as usize..starts[first + k + 1] as usize;
         if cvs.len() >= 2 && rest[cvs.clone()].as_flattened().iter().all(|x| x.is_finite()) {
             let width = cvs.clone().fold(0.0, |most: f32, cv| most.max(how.width.at(cv)));
-            *out = HalfSpace::of(&rest[cvs], &grown[first + k].shift, f64::from(width), how);
+            *out = HalfSpace::of(
+                &rest[cvs.clone()],
+                &grown[first + k].shift,
+                f64::from(width),
+                how.gap_at(cvs.start),
+                how,
+            );
         }
     }
 }
@@ -169,9 +176,9 @@ impl AtRest {
         self.curves.iter().map(|curve| u64::from(curve.low)).sum()
     }
 
-    /// The direction out of the skin at a curve's root; zero where unknown.
-    pub(super) fn up(&self, curve: usize) -> DVec3 {
-        self.curves[curve].up
+    /// The skin around a curve's root; none where it is not known.
+    pub(super) fn around(&self, curve: usize) -> Option<RootSurface> {
+        self.curves[curve].around
     }
 
     /// The displacement of a curve.

@@ -1,12 +1,13 @@
 //! Hairs turned as their guides are.
 
-use super::turns::{GuideTurns, Turn};
+use super::turns::{GuideTurns, SegmentTurns, TURNED};
 use crate::attach::{RootPose, relative_stretch, tasks};
 use crate::guides::{GuideWeight, GuideWeights};
 use nalgebra::{Quaternion, Unit};
 use numerics::masked::Masked;
 use numerics::parallel;
-use numerics::vector::{DMat3, DQuat, DVec3, to_f32, to_f64};
+use numerics::simd::{Path, kernel};
+use numerics::vector::{DMat3, DQuat, DVec3, Vec3, to_f32, to_f64};
 use std::ops::Range;
 
 /// What a groom follows.
@@ -30,7 +31,7 @@ pub struct CurveDeform<'a> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeformedCurves {
     /// One point for each input point, metres.
-    pub points: Vec<[f32; 3]>,
+    pub points: Vec<Vec3>,
     /// The rotation of each CV, that of the segment after it; empty if not asked for.
     pub rotations: Vec<DQuat>,
     /// Largest change of a segment's length ÷ its curve's length, measured on the results.
@@ -47,30 +48,65 @@ const WEIGHT_ROUNDING: f64 = 1e-6;
 ///
 /// # Panics
 /// If `starts` does not run from 0 to the number of points, or a slice of `how` is shorter than its rows.
-pub fn deform_curves(starts: &[u32], rest: &[[f32; 3]], how: &CurveDeform<'_>, with_rotations: bool) -> DeformedCurves {
+pub fn deform_curves(starts: &[u32], rest: &[Vec3], how: &CurveDeform<'_>, with_rotations: bool) -> DeformedCurves {
+    deform_curves_on(Path::chosen(), starts, rest, how, with_rotations)
+}
+
+/// [`deform_curves`] on a given SIMD path.
+pub(super) fn deform_curves_on(
+    path: Path,
+    starts: &[u32],
+    rest: &[Vec3],
+    how: &CurveDeform<'_>,
+    with_rotations: bool,
+) -> DeformedCurves {
     let mut points = vec![[0.0; 3]; rest.len()];
-    let done = parallel::map(tasks(starts, &mut points), |_, (curves, mut out)| {
-        let (mut largest, mut rotations, mut shares) = (0.0_f64, Vec::new(), Vec::new());
-        for curve in curves {
-            let rows = starts[curve] as usize..starts[curve + 1] as usize;
-            let (mine, after) = out.split_at_mut(rows.len());
-            let hair = Hair { curve, first: rows.start, rest: &rest[rows], how };
-            hair.follow(&mut shares, mine, with_rotations.then_some(&mut rotations));
-            largest = largest.max(relative_stretch(mine, hair.rest));
-            out = after;
-        }
-        (largest, rotations)
+    let done = parallel::map(tasks(starts, &mut points), |_, (curves, out)| {
+        follow(path, curves, starts, rest, how, out, with_rotations)
     });
     let (errors, rotations): (Vec<f64>, Vec<Vec<DQuat>>) = done.into_iter().unzip();
     let length_error = errors.into_iter().fold(0.0, f64::max);
     DeformedCurves { points, rotations: parallel::concat(rotations), length_error }
 }
 
+kernel! {
+    /// Deforms `curves` into `out`; returns the largest stretch, and rotations if they are wanted.
+    fn follow(
+        curves: Range<usize>,
+        starts: &[u32],
+        rest: &[Vec3],
+        how: &CurveDeform<'_>,
+        out: &mut [Vec3],
+        with_rotations: bool,
+    ) -> (f64, Vec<DQuat>) = follow_task;
+}
+
+#[inline(always)]
+fn follow_task(
+    curves: Range<usize>,
+    starts: &[u32],
+    rest: &[Vec3],
+    how: &CurveDeform<'_>,
+    out: &mut [Vec3],
+    with_rotations: bool,
+) -> (f64, Vec<DQuat>) {
+    let (mut largest, mut rotations, mut shares, mut base) = (0.0_f64, Vec::new(), Vec::new(), 0);
+    for curve in curves {
+        let rows = starts[curve] as usize..starts[curve + 1] as usize;
+        let mine = &mut out[base..base + rows.len()];
+        base += rows.len();
+        let hair = Hair { curve, first: rows.start, rest: &rest[rows], how };
+        hair.follow(&mut shares, mine, if with_rotations { Some(&mut rotations) } else { None });
+        largest = largest.max(relative_stretch(mine, hair.rest));
+    }
+    (largest, rotations)
+}
+
 struct Hair<'a> {
     curve: usize,
     /// Row of its root.
     first: usize,
-    rest: &'a [[f32; 3]],
+    rest: &'a [Vec3],
     how: &'a CurveDeform<'a>,
 }
 
@@ -85,27 +121,52 @@ struct Share {
 }
 
 impl Hair<'_> {
-    fn follow(&self, shares: &mut Vec<Share>, out: &mut [[f32; 3]], mut rotations: Option<&mut Vec<DQuat>>) {
+    #[inline(always)]
+    fn follow(&self, shares: &mut Vec<Share>, out: &mut [Vec3], mut rotations: Option<&mut Vec<DQuat>>) {
         let Some(root) = out.first_mut() else { return };
         let offset = self.gather(shares);
-        let pose = self.how.poses.map(|poses| poses[self.curve]);
-        let carried = |v: DVec3| pose.map_or(v, |pose| pose.rotation * v);
-        let moved = pose.map_or(DVec3::zeros(), |pose| pose.translation);
-        // Added as displacements, so that guides at rest change no bit.
-        let mut displacement = moved + carried(offset * self.blend(0));
+        let mut unguided = 1.0;
+        for share in shares.iter() {
+            unguided -= share.weight;
+        }
+        let (mut displacement, mut still) = (offset * self.blend(0), None);
+        if let Some(poses) = self.how.poses {
+            let pose = &poses[self.curve];
+            // Added as displacements, so that guides at rest change no bit.
+            displacement = pose.translation + pose.rotation * displacement;
+            still = Some(pose.rotation);
+        }
         *root = to_f32(to_f64(self.rest[0]) + displacement);
-        let still = pose.map_or_else(DQuat::identity, |pose| pose.rotation);
-        let mut rotation = still;
+        let mut rotation = still.unwrap_or_else(DQuat::identity);
         // Hairs before this one have a segment less than CVs.
-        let middles = &self.how.middles[self.first - self.curve..];
-        for k in 0..self.rest.len() - 1 {
-            let segment = to_f64(self.rest[k + 1]) - to_f64(self.rest[k]);
-            let turn = self.part(self.turn(shares, middles[k]), k);
-            displacement += carried(turn * segment) - segment;
-            out[k + 1] = to_f32(to_f64(self.rest[k + 1]) + displacement);
-            if let Some(rotations) = &mut rotations {
-                rotation = still * turn;
-                rotations.push(rotation);
+        let segments = self.rest.len() - 1;
+        let middles = &self.how.middles[self.first - self.curve..][..segments];
+        for first in (0..segments).step_by(TURNED) {
+            let count = TURNED.min(segments - first);
+            let mut turns = self.turns(shares, &middles[first..first + count], unguided);
+            self.take_part(&mut turns, first, count);
+            let mut along = [[0.0; TURNED]; 3];
+            for lane in 0..count {
+                let [from, to] = [self.rest[first + lane], self.rest[first + lane + 1]];
+                for axis in 0..3 {
+                    along[axis][lane] = f64::from(to[axis]) - f64::from(from[axis]);
+                }
+            }
+            let mut turned = turns.rotate(&along);
+            if let Some(still) = &still {
+                turned = SegmentTurns::all(still).rotate(&turned);
+            }
+            for lane in 0..count {
+                for axis in 0..3 {
+                    displacement[axis] += turned[axis][lane] - along[axis][lane];
+                }
+                let cv = first + lane + 1;
+                out[cv] = to_f32(to_f64(self.rest[cv]) + displacement);
+                if let Some(rotations) = &mut rotations {
+                    let turn = turns.quaternion(lane);
+                    rotation = still.map_or(turn, |still| still * turn);
+                    rotations.push(rotation);
+                }
             }
         }
         if let Some(rotations) = rotations {
@@ -114,13 +175,17 @@ impl Hair<'_> {
     }
 
     /// Collects its guides; returns the mean offset of their roots, in its own frame.
+    #[inline(always)]
     fn gather(&self, shares: &mut Vec<Share>) -> DVec3 {
         shares.clear();
         let mut offset = DVec3::zeros();
         if self.how.weights.hairs() == 0 {
             return offset;
         }
-        for guide in self.how.weights.of(self.curve).iter().filter(|guide| guide.weight > 0.0) {
+        for guide in self.how.weights.of(self.curve) {
+            if guide.weight <= 0.0 {
+                continue;
+            }
             let (rows, matrix) = (self.how.turns.rows(guide.guide as usize), weighted(guide));
             offset += matrix * self.how.turns.offset(guide.guide as usize);
             shares.push(Share { weight: f64::from(guide.weight), matrix, at: rows.start, rows });
@@ -128,52 +193,64 @@ impl Hair<'_> {
         offset
     }
 
-    /// The mean rotation of its guides at `u`.
-    fn turn(&self, shares: &mut [Share], u: f64) -> Quaternion<f64> {
-        let (mut w, mut v, mut rest) = (0.0, DVec3::zeros(), 1.0);
-        let mut heaviest: Option<Turn> = None;
+    /// The mean rotations of its guides at some fractions of their lengths; `unguided` is the weight that no guide holds.
+    #[inline(always)]
+    fn turns(&self, shares: &mut [Share], middles: &[f64], unguided: f64) -> SegmentTurns {
+        let mut sum = SegmentTurns::default();
+        let mut heaviest: Option<SegmentTurns> = None;
         for share in shares {
-            rest -= share.weight;
             if share.rows.is_empty() {
-                w += share.weight;
+                sum.add_still(share.weight);
                 continue;
             }
-            let turn = self.how.turns.at(&share.rows, u, &mut share.at);
-            let turn = Turn { w: share.weight * turn.w, v: share.matrix * turn.v };
-            (w, v) = (w + turn.w, v + turn.v);
-            heaviest = heaviest.or(Some(turn));
+            let turns = self.how.turns.at(&share.rows, middles, &mut share.at);
+            let turns = turns.weighted(share.weight, &share.matrix);
+            sum.add(&turns);
+            if heaviest.is_none() {
+                heaviest = Some(turns);
+            }
         }
         // What no guide holds stays at rest.
-        w += if rest > WEIGHT_ROUNDING { rest } else { 0.0 };
-        let size = (w * w + v.norm_squared()).sqrt();
-        if size > CANCELLED {
-            return Quaternion::from_parts(w / size, v / size);
+        sum.add_still(if unguided > WEIGHT_ROUNDING { unguided } else { 0.0 });
+        let sizes = sum.sizes();
+        let mut unit = sum.divided(&sizes);
+        for lane in 0..middles.len() {
+            if sizes[lane] > CANCELLED {
+                continue;
+            }
+            let heaviest = heaviest.unwrap_or_else(|| SegmentTurns::all(&DQuat::identity()));
+            unit.set(lane, &heaviest.divided(&heaviest.sizes()));
         }
-        let Turn { w, v } = heaviest.unwrap_or(Turn { w: 1.0, v: DVec3::zeros() });
-        let size = (w * w + v.norm_squared()).sqrt();
-        Quaternion::from_parts(w / size, v / size)
+        unit
     }
 
-    /// The part of a rotation that the CV follows.
-    fn part(&self, turn: Quaternion<f64>, cv: usize) -> DQuat {
-        let share = self.blend(cv);
-        if share == 1.0 {
-            return Unit::new_unchecked(turn);
+    /// Replaces rotations by the part that the CVs from `first` on follow.
+    #[inline(always)]
+    fn take_part(&self, turns: &mut SegmentTurns, first: usize, count: usize) {
+        for lane in 0..count {
+            let share = self.blend(first + lane);
+            if share == 1.0 {
+                continue;
+            }
+            let turn = turns.quaternion(lane);
+            let (sine, cosine) = (turn.imag().norm(), turn.w);
+            let mut part = DQuat::identity();
+            if sine > 0.0 {
+                let (part_sine, part_cosine) = libm::sincos(share * libm::atan2(sine, cosine));
+                part = Unit::new_unchecked(Quaternion::from_parts(part_cosine, turn.imag() * (part_sine / sine)));
+            }
+            turns.set(lane, &SegmentTurns::all(&part));
         }
-        let (sine, cosine) = (turn.imag().norm(), turn.w);
-        if sine == 0.0 {
-            return DQuat::identity();
-        }
-        let (part_sine, part_cosine) = libm::sincos(share * libm::atan2(sine, cosine));
-        Unit::new_unchecked(Quaternion::from_parts(part_cosine, turn.imag() * (part_sine / sine)))
     }
 
+    #[inline(always)]
     fn blend(&self, cv: usize) -> f64 {
         f64::from(self.how.blend.at(self.first + cv)).clamp(0.0, 1.0)
     }
 }
 
 /// A guide's weight times the rotation from its frame to the hair's.
+#[inline(always)]
 fn weighted(guide: &GuideWeight) -> DMat3 {
     let [x, y, z, w] = guide.rotation.map(f64::from);
     let weight = f64::from(guide.weight);

@@ -3,14 +3,150 @@
 use crate::attach::RootPose;
 use nalgebra::{Quaternion, Vector3};
 use numerics::parallel;
-use numerics::vector::{self, DQuat, DVec3, to_f32, to_f64};
+use numerics::vector::{self, DMat3, DQuat, DVec3, to_f32, to_f64};
+use std::ops::Range;
 
 /// A rotation as w and x, y, z. Along a guide its sign is continuous: turns of more than half a revolution are kept
 /// apart from the lesser ones with the same result.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Turn {
-    pub(super) w: f64,
-    pub(super) v: DVec3,
+struct Turn {
+    w: f64,
+    v: DVec3,
+}
+
+/// Number of segments that are turned side by side.
+pub(super) const TURNED: usize = 4;
+
+/// Rotations of successive segments of a curve, side by side: w, x, y, z.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct SegmentTurns([[f64; TURNED]; 4]);
+
+impl SegmentTurns {
+    /// The same for all.
+    #[inline(always)]
+    pub(super) fn all(turn: &DQuat) -> Self {
+        Self([[turn.w; TURNED], [turn.i; TURNED], [turn.j; TURNED], [turn.k; TURNED]])
+    }
+
+    #[inline(always)]
+    fn put(&mut self, lane: usize, turn: &Turn) {
+        let Turn { w, v } = turn;
+        for (part, value) in [*w, v.x, v.y, v.z].into_iter().enumerate() {
+            self.0[part][lane] = value;
+        }
+    }
+
+    /// Takes one of the rotations from others.
+    #[inline(always)]
+    pub(super) fn set(&mut self, lane: usize, from: &Self) {
+        for part in 0..4 {
+            self.0[part][lane] = from.0[part][lane];
+        }
+    }
+
+    /// One of them, which must be of length 1.
+    #[inline(always)]
+    pub(super) fn quaternion(&self, lane: usize) -> DQuat {
+        let [w, x, y, z] = self.0;
+        nalgebra::Unit::new_unchecked(Quaternion::new(w[lane], x[lane], y[lane], z[lane]))
+    }
+
+    #[inline(always)]
+    fn towards(mut self, next: &Self, shares: &[f64; TURNED]) -> Self {
+        for part in 0..4 {
+            for lane in 0..TURNED {
+                self.0[part][lane] += (next.0[part][lane] - self.0[part][lane]) * shares[lane];
+            }
+        }
+        self
+    }
+
+    /// Times a weight; `matrix` is the weight times a rotation, which turns the axes.
+    #[inline(always)]
+    pub(super) fn weighted(&self, weight: f64, matrix: &DMat3) -> Self {
+        let [w, x, y, z] = &self.0;
+        let mut out = Self::default();
+        for lane in 0..TURNED {
+            out.0[0][lane] = weight * w[lane];
+        }
+        for row in 0..3 {
+            for lane in 0..TURNED {
+                let [a, b] = [matrix[(row, 0)] * x[lane], matrix[(row, 1)] * y[lane]];
+                out.0[row + 1][lane] = a + b + matrix[(row, 2)] * z[lane];
+            }
+        }
+        out
+    }
+
+    #[inline(always)]
+    pub(super) fn add(&mut self, other: &Self) {
+        for part in 0..4 {
+            for lane in 0..TURNED {
+                self.0[part][lane] += other.0[part][lane];
+            }
+        }
+    }
+
+    /// Adds a weight of no rotation.
+    #[inline(always)]
+    pub(super) fn add_still(&mut self, weight: f64) {
+        for lane in 0..TURNED {
+            self.0[0][lane] += weight;
+        }
+    }
+
+    /// Their lengths as quaternions.
+    #[inline(always)]
+    pub(super) fn sizes(&self) -> [f64; TURNED] {
+        let [w, x, y, z] = &self.0;
+        let mut sizes = [0.0; TURNED];
+        for lane in 0..TURNED {
+            let sine = x[lane] * x[lane] + y[lane] * y[lane] + z[lane] * z[lane];
+            sizes[lane] = (w[lane] * w[lane] + sine).sqrt();
+        }
+        sizes
+    }
+
+    #[inline(always)]
+    pub(super) fn divided(mut self, by: &[f64; TURNED]) -> Self {
+        for part in 0..4 {
+            for lane in 0..TURNED {
+                self.0[part][lane] /= by[lane];
+            }
+        }
+        self
+    }
+
+    /// Vectors, side by side, turned by them; they must be of length 1.
+    #[inline(always)]
+    pub(super) fn rotate(&self, vectors: &[[f64; TURNED]; 3]) -> [[f64; TURNED]; 3] {
+        let [w, axis @ ..] = &self.0;
+        let mut turned = cross_side_by_side(axis, vectors);
+        for part in &mut turned {
+            for lane in 0..TURNED {
+                part[lane] *= 2.0;
+            }
+        }
+        let across = cross_side_by_side(axis, &turned);
+        for part in 0..3 {
+            for lane in 0..TURNED {
+                turned[part][lane] = turned[part][lane] * w[lane] + across[part][lane] + vectors[part][lane];
+            }
+        }
+        turned
+    }
+}
+
+#[inline(always)]
+fn cross_side_by_side(a: &[[f64; TURNED]; 3], b: &[[f64; TURNED]; 3]) -> [[f64; TURNED]; 3] {
+    let mut out = [[0.0; TURNED]; 3];
+    for axis in 0..3 {
+        let (y, z) = ((axis + 1) % 3, (axis + 2) % 3);
+        for lane in 0..TURNED {
+            out[axis][lane] = a[y][lane] * b[z][lane] - a[z][lane] * b[y][lane];
+        }
+    }
+    out
 }
 
 /// The rotation of each segment of the guides since rest.
@@ -63,7 +199,7 @@ impl GuideTurns {
 
     /// The rows of a guide's segments.
     #[inline(always)]
-    pub(super) fn rows(&self, guide: usize) -> std::ops::Range<usize> {
+    pub(super) fn rows(&self, guide: usize) -> Range<usize> {
         self.starts[guide] as usize..self.starts[guide + 1] as usize
     }
 
@@ -72,20 +208,25 @@ impl GuideTurns {
         &self.offsets[guide]
     }
 
-    /// The rotation at `u` of a guide with segments in these `rows`, interpolated between the middles of segments;
-    /// `at` is the row of the last call for a smaller `u`, or the first.
+    /// The rotations at ascending fractions of a guide with segments in these `rows`, interpolated between the middles of
+    /// segments; `at` is the row of the last call for smaller fractions, or the first.
     #[inline(always)]
-    pub(super) fn at(&self, rows: &std::ops::Range<usize>, u: f64, at: &mut usize) -> Turn {
-        while *at + 1 < rows.end && self.middles[*at + 1] <= u {
-            *at += 1;
+    pub(super) fn at(&self, rows: &Range<usize>, fractions: &[f64], at: &mut usize) -> SegmentTurns {
+        let (mut here, mut next, mut shares) = (SegmentTurns::default(), SegmentTurns::default(), [0.0; TURNED]);
+        let middles = &self.middles[..rows.end];
+        for (lane, u) in fractions.iter().enumerate() {
+            while *at + 1 < rows.end && middles[*at + 1] <= *u {
+                *at += 1;
+            }
+            let is_between = *at + 1 < rows.end && *u > middles[*at];
+            let after = *at + usize::from(is_between);
+            if is_between {
+                shares[lane] = (u - middles[*at]) / (middles[after] - middles[*at]);
+            }
+            here.put(lane, &self.turns[*at]);
+            next.put(lane, &self.turns[after]);
         }
-        let here = self.turns[*at];
-        if *at + 1 == rows.end || u <= self.middles[*at] {
-            return here;
-        }
-        let [from, to] = [self.middles[*at], self.middles[*at + 1]];
-        let (next, share) = (self.turns[*at + 1], (u - from) / (to - from));
-        Turn { w: here.w + (next.w - here.w) * share, v: here.v + (next.v - here.v) * share }
+        here.towards(&next, &shares)
     }
 }
 

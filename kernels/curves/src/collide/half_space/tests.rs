@@ -46,9 +46,9 @@ fn what_a_half_space_frees_the_trees_free_too() {
             obstacles: &[&tree],
             skin: Some(skin),
             method: ContactMethod::Exact,
-            coherence: 0.0,
-            gap,
-            offset_root: 0.0,
+            coherence: 0.0.into(),
+            gap: gap.into(),
+            offset_root: 0.0.into(),
             offset_scale: None,
             loft: 0.0.into(),
             at_rest: None,
@@ -57,7 +57,7 @@ fn what_a_half_space_frees_the_trees_free_too() {
         };
         let root = DVec3::z() * (size * number(key.of(1), 0.0, 2e-4));
         let tip = root + DVec3::z() * size;
-        let half_space = HalfSpace::of(&[to_f32(root), to_f32(tip)], &DVec3::zeros(), 0.1 * size, &how);
+        let half_space = HalfSpace::of(&[to_f32(root), to_f32(tip)], &DVec3::zeros(), 0.1 * size, gap, &how);
         let mut nearby = Vec::new();
         for case in 0..3000 {
             let key = key.of(2).of(case);
@@ -119,23 +119,24 @@ fn rise_is_the_highest_corner_in_reach() {
         obstacles: &[&tree],
         skin: Some(SkinSurface { tree: &tree, triangles: &triangles, normals: &normals }),
         method: ContactMethod::Exact,
-        coherence: 0.0,
-        gap: 1e-4,
-        offset_root: 0.0,
+        coherence: 0.0.into(),
+        gap: 1e-4.into(),
+        offset_root: 0.0.into(),
         offset_scale: None,
         loft: 0.0.into(),
         at_rest: None,
         blend: Masked::uniform(1.0),
         width: Masked::uniform(0.0),
     };
-    let rise =
-        |length: f32| HalfSpace::of(&[[0.0; 3], [0.0, 0.0, length]], &DVec3::zeros(), 0.0, &how).rises[SHELLS - 1];
+    let rise = |length: f32| {
+        HalfSpace::of(&[[0.0; 3], [0.0, 0.0, length]], &DVec3::zeros(), 0.0, 1e-4, &how).rises[SHELLS - 1]
+    };
     assert!(rise(0.15).abs() < 1e-6, "{}", rise(0.15));
     assert!((rise(0.5) - 0.1).abs() < 1e-6, "{}", rise(0.5));
     // Near the root only what is near it counts.
-    let near = HalfSpace::of(&[[0.0; 3], [0.0, 0.0, 0.5]], &DVec3::zeros(), 0.0, &how);
+    let near = HalfSpace::of(&[[0.0; 3], [0.0, 0.0, 0.5]], &DVec3::zeros(), 0.0, 1e-4, &how);
     assert!(near.rises[0].abs() < 1e-6 && near.rises.is_sorted() && near.reaches.is_sorted(), "{near:?}");
     // A bump higher than the curve is long: nothing is freed as far out.
-    let low = HalfSpace::of(&[[0.15, 0.0, 0.0], [0.15, 0.0, 0.09]], &DVec3::zeros(), 0.0, &how);
+    let low = HalfSpace::of(&[[0.15, 0.0, 0.0], [0.15, 0.0, 0.09]], &DVec3::zeros(), 0.0, 1e-4, &how);
     assert_eq!(low.reaches[SHELLS - 1], 0.0);
 }

@@ -94,7 +94,7 @@ fn half_spaces_change_no_bit() {
     let known = clearance.half_spaces.get().expect("found at the second use");
     let free = |hair: &usize| {
         let cvs = &goal[hair * CVS as usize..][..CVS as usize];
-        is_clear(&(&known[*hair], to_f64(rest[hair * CVS as usize])), cvs, tested_start(cvs, 5e-4))
+        known[*hair].clears_curve(&to_f64(rest[hair * CVS as usize]), cvs, 5e-4)
     };
     assert!((0..600).filter(free).count() > 300, "most hairs are free without a query");
     assert_eq!(first, second);

@@ -10,7 +10,7 @@ fn over_floor(goal: DVec3, others: &[&TriangleTree]) -> Collided {
     let (tree, normals) = (TriangleTree::build(&points, &triangles), normals(&points, &triangles));
     let skin = SkinSurface { tree: &tree, triangles: &triangles, normals: &normals };
     let obstacles: Vec<&TriangleTree> = std::iter::once(&tree).chain(others.iter().copied()).collect();
-    let how = Collide { skin: Some(skin), coherence: 1.0, offset_root: 0.0, ..on(&obstacles) };
+    let how = Collide { skin: Some(skin), coherence: 1.0.into(), offset_root: 0.0.into(), ..on(&obstacles) };
     let root = DVec3::new(0.0, 0.1, 0.0);
     let rest = [to_f32(root), to_f32(root + DVec3::y())];
     collide(&[0, 2], &rest, &[rest[0], to_f32(root + goal.normalize())], &how)
@@ -71,7 +71,7 @@ fn no_tip_on_a_sphere_jumps_in_wind_that_turns_by_a_degree() {
         for degrees in (0..360).step_by(20).map(f64::from) {
             let tips = [degrees, degrees + 1.0].map(|degrees| {
                 let (starts, rest, goal) = fur(1000, 6, 0.3, wind(degrees));
-                let how = Collide { skin: Some(skin), coherence, ..on(&obstacles) };
+                let how = Collide { skin: Some(skin), coherence: coherence.into(), ..on(&obstacles) };
                 let out = collide(&starts, &rest, &goal, &how);
                 assert_eq!(out.crossings_left, 0);
                 out.points.iter().skip(5).step_by(6).map(|tip| to_f64(*tip)).collect::<Vec<_>>()

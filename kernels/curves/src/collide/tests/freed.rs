@@ -45,7 +45,7 @@ fn what_is_free_at_rest_is_free_in_any_wind() {
         let settings = [(ContactMethod::Exact, 0.0), (ContactMethod::Steps(8), 0.0), (ContactMethod::Exact, 1.0)];
         for (method, coherence) in settings {
             let skin = skin.filter(|_| coherence > 0.0);
-            let how = Collide { method, skin, coherence, ..hairs::on(&obstacles) };
+            let how = Collide { method, skin, coherence: coherence.into(), ..hairs::on(&obstacles) };
             let out = collide(&fur.starts, &fur.rest, &fur.goal, &how);
             let crossings = crossings_of_each(&fur, &out.points);
             let free = free_where_lifted(&fur, &at_rest(&fur.starts, &fur.rest, &how));
@@ -89,5 +89,5 @@ fn a_curve_is_blended_to_its_first_free_pose_towards_rest() {
 
 /// A curve without a half-space that is not displaced.
 fn hair<'a>(rest: &'a [Vec3], goal: &'a [Vec3], out: &'a mut [Vec3]) -> Hair<'a> {
-    Hair { first: 0, shift: DVec3::zeros(), half_space: None, up: DVec3::zeros(), rest, goal, out }
+    Hair { first: 0, shift: DVec3::zeros(), half_space: None, around: None, rest, goal, out }
 }

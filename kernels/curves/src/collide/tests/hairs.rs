@@ -11,11 +11,11 @@ pub(super) fn on<'a>(obstacles: &'a [&'a TriangleTree]) -> Collide<'a> {
         obstacles,
         skin: None,
         method: ContactMethod::Exact,
-        gap: 1e-4,
-        offset_root: 1e-4,
+        gap: 1e-4.into(),
+        offset_root: 1e-4.into(),
         offset_scale: None,
         loft: 0.0.into(),
-        coherence: 0.0,
+        coherence: 0.0.into(),
         at_rest: None,
         blend: WHOLE,
         width: PLAIN,
@@ -195,7 +195,8 @@ fn fur_with_coherence_crosses_nothing_either() {
     for (k, wind) in [DVec3::x(), -DVec3::y(), random_unit(Key::new(8))].iter().enumerate() {
         for coherence in [0.3, 1.0] {
             let (starts, rest, goal) = fur(1000, 6, 0.5, *wind);
-            let out = collide(&starts, &rest, &goal, &Collide { skin: Some(skin), coherence, ..on(&obstacles) });
+            let how = Collide { skin: Some(skin), coherence: coherence.into(), ..on(&obstacles) };
+            let out = collide(&starts, &rest, &goal, &how);
             assert_eq!(out.unfreed_segments, 0, "case {k}, {coherence}");
             assert_eq!(crossings(&starts, &out.points, &mesh), 0, "case {k}, {coherence}");
             assert!(worst_length(&starts, &goal, &out.points) < 1e-6);
@@ -209,9 +210,9 @@ fn steps_converge_to_exact_with_order_1() {
     let tree = TriangleTree::build(&mesh.0, &mesh.1);
     let obstacles = [&tree];
     let (starts, rest, goal) = fur(2000, 2, 0.3, DVec3::x());
-    let exact = collide(&starts, &rest, &goal, &Collide { gap: 1e-9, ..on(&obstacles) }).points;
+    let exact = collide(&starts, &rest, &goal, &Collide { gap: 1e-9.into(), ..on(&obstacles) }).points;
     let error = |steps: u32| {
-        let how = Collide { method: ContactMethod::Steps(steps), gap: 1e-9, ..on(&obstacles) };
+        let how = Collide { method: ContactMethod::Steps(steps), gap: 1e-9.into(), ..on(&obstacles) };
         let out = collide(&starts, &rest, &goal, &how).points;
         out.iter().zip(&exact).map(|(a, b)| f64::from(vector::length(vector::sub(*a, *b)))).sum::<f64>()
     };
@@ -228,14 +229,15 @@ fn the_skin_lifts_roots_and_keeps_goals_off() {
     let normals = normals(&mesh.0, &mesh.1);
     let skin = SkinSurface { tree: &tree, triangles: &mesh.1, normals: &normals };
     let (starts, rest, goal) = fur(200, 5, 0.3, DVec3::x());
-    let lifted = Collide { skin: Some(skin), offset_root: 0.01, ..on(&obstacles) };
+    let lifted = Collide { skin: Some(skin), offset_root: 0.01.into(), ..on(&obstacles) };
     let out = collide(&starts, &rest, &goal, &lifted);
     let height = |p: &Vec3| f64::from(vector::length(*p)) - 1.0;
     let roots: Vec<f64> = out.points.iter().step_by(5).map(height).collect();
     // A facet of π/48 by π/48 lies up to 2 (1 − cos(π/96)) below the sphere.
     assert!(roots.iter().all(|height| (0.0089..0.0101).contains(height)), "{roots:?}");
     for scale in [1.0, 0.5] {
-        let kept = Collide { skin: Some(skin), offset_root: 0.0, offset_scale: Some(scale.into()), ..on(&obstacles) };
+        let kept =
+            Collide { skin: Some(skin), offset_root: 0.0.into(), offset_scale: Some(scale.into()), ..on(&obstacles) };
         let out = collide(&starts, &rest, &goal, &kept);
         // Lengths are kept, so a CV lies slightly lower than requested, especially at a bend.
         let share: Vec<f64> = out.points.iter().zip(&rest).map(|(now, rest)| height(now) / height(rest)).collect();
@@ -262,7 +264,7 @@ fn without_offset_roots_on_the_skin_keep_their_bits() {
             rest[cv] = (corner * (1.0 + u)).map(|x| x as f32).into();
         }
     }
-    let out = collide(&starts, &rest, &goal, &Collide { offset_root: 0.0, ..on(&obstacles) });
+    let out = collide(&starts, &rest, &goal, &Collide { offset_root: 0.0.into(), ..on(&obstacles) });
     for ends in starts.windows(2) {
         assert_eq!(out.points[ends[0] as usize], goal[ends[0] as usize]);
     }
