@@ -278,7 +278,8 @@ mod tests {
                     "curves": {{ "type": "Curve_In", "params": {{ "points": [[0, 1, 0], [0, 2, 0]] }} }},
                     "node": {{ "type": "Attribute_Expr", "inputs": {{ "geometry": "curves" }}, "params": {{ "code": "{code}" }} }} }} }}"#
             );
-            let catalogue = Catalogue(&[crate::NODES]);
+            static FAMILIES: [&[&Node]; 1] = [crate::NODES];
+            let catalogue = Catalogue(&FAMILIES);
             let graph = Graph::load(&text, std::path::Path::new("."), catalogue, &[], &probe).unwrap();
             let engine = Engine::new(&Settings::default()).unwrap();
             let (found, report) = cook_all(&engine, &graph, &[Frame::whole(1)]);
