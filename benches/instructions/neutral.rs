@@ -99,7 +99,7 @@ pub(crate) const NEUTRAL: &[Neutral] = &[
     Neutral {
         without: on_fur("no gusts", &[FUR, MOVING, GUSTS[0], BLOWN], "blown"),
         with: on_fur("gusts that do not reach the fur", &[FUR, MOVING, GUSTS[1], BLOWN], "blown"),
-        missed: true,
+        missed: false,
     },
     Neutral {
         without: on_beam(
@@ -160,7 +160,7 @@ pub(crate) const NEUTRAL: &[Neutral] = &[
                                   "domain_from": [-0.4, -0.4, -0.4], "domain_to": [0.4, 7.6, 0.4] } },"#,
             ],
         ),
-        missed: true,
+        missed: false,
     },
     Neutral {
         without: on_fur("no other nodes", &[FUR, WIND], "wind"),
@@ -185,7 +185,7 @@ pub(crate) const NEUTRAL: &[Neutral] = &[
             output: "wind",
             frames: 6,
         },
-        missed: true,
+        missed: false,
     },
 ];
 

@@ -128,10 +128,15 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
         Over::Points => Owner::Point,
         Over::Elements => Owner::Element,
     };
-    let written = run(program, &env(cx, &code), part, owner)?;
     cx.publish(ROWS, part.table(owner).rows() as f64);
-    for (name, column) in written {
-        part.set_column(owner, name, column)?;
+    let env = env(cx, &code);
+    // Where nobody takes what the code writes, only its faults count: it runs on no rows.
+    if program.writes().iter().any(|name| *name == *P.name || cx.wants_named(name)) {
+        for (name, column) in run(program, &env, part, owner, part.table(owner).rows())? {
+            part.set_column(owner, name, column)?;
+        }
+    } else {
+        run(program, &env, part, owner, 0)?;
     }
     Ok(CHANGED.with(geometry))
 }
@@ -154,8 +159,8 @@ fn part(geometry: &mut Geometry, component: Part) -> Result<&mut Component> {
     geometry.part_mut(kind).ok_or_else(|| Error::refused(format!("`geometry` has no {kind}")).hint(hint).of_types())
 }
 
-/// The columns that the code writes.
-fn run(program: &Program, env: &Env<'_>, part: &Component, owner: Owner) -> Result<Vec<(String, Column)>> {
+/// The columns that the code writes, run on the first `rows` rows.
+fn run(program: &Program, env: &Env<'_>, part: &Component, owner: Owner, rows: usize) -> Result<Vec<(String, Column)>> {
     let table = part.table(owner);
     let lent: Vec<(&str, Column)> = program
         .reads()
@@ -168,7 +173,13 @@ fn run(program: &Program, env: &Env<'_>, part: &Component, owner: Owner) -> Resu
     }
     let own = table.iter().map(|(name, column)| (&**name, column));
     let columns: Vec<(&str, &Column)> = own.chain(lent.iter().map(|(name, column)| (*name, column))).collect();
-    program.run(env, &columns, table.rows()).map_err(|error| explained(error, part, owner))
+    if rows == table.rows() {
+        return program.run(env, &columns, rows).map_err(|error| explained(error, part, owner));
+    }
+    let chosen: Vec<u32> = (0..rows as u32).collect();
+    let cut: Vec<(&str, Column)> = columns.iter().map(|(name, column)| (*name, column.gather(&chosen))).collect();
+    let columns: Vec<(&str, &Column)> = cut.iter().map(|(name, column)| (*name, column)).collect();
+    program.run(env, &columns, rows).map_err(|error| explained(error, part, owner))
 }
 
 /// An attribute that rows of `owner` do not have themselves: taken from the whole component, from a CV's curve, or
@@ -221,6 +232,7 @@ mod tests {
     use super::*;
     use conformance::{Bench, BenchResult, bench, conformance, cook_all};
     use engine::cook::{Engine, Settings};
+    use engine::graph::{Catalogue, Graph, probe};
 
     fn curves() -> Component {
         let points = vec![[0.0, 0.5, 0.0], [0.0, 2.0, 0.0], [3.0, 1.0, 0.0]];
@@ -256,6 +268,30 @@ mod tests {
         assert!(out.curves().topology().same(input.topology()));
         let shielded = |curves: &Component| curves.table(Owner::Element).column("shielded").unwrap().address();
         assert_eq!(shielded(out.curves()), shielded(&input));
+    }
+
+    #[test]
+    fn code_whose_results_nobody_takes_does_not_run_on_rows_but_its_faults_are_found() {
+        let cook = |code: &str, wanted: &str| {
+            let text = format!(
+                r#"{{ "convect": 1, "outputs": {{ "out": {{ "from": "node", "attributes": [{wanted}] }} }}, "nodes": {{
+                    "curves": {{ "type": "Curve_In", "params": {{ "points": [[0, 1, 0], [0, 2, 0]] }} }},
+                    "node": {{ "type": "Attribute_Expr", "inputs": {{ "geometry": "curves" }}, "params": {{ "code": "{code}" }} }} }} }}"#
+            );
+            static FAMILIES: [&[&Node]; 1] = [crate::NODES];
+            let catalogue = Catalogue(&FAMILIES);
+            let graph = Graph::load(&text, std::path::Path::new("."), catalogue, &[], &probe).unwrap();
+            let engine = Engine::new(&Settings::default()).unwrap();
+            let (found, report) = cook_all(&engine, &graph, &[Frame::whole(1)]);
+            (found.into_values().next(), report.errors.first().map(|(_, error, _)| error.to_string()))
+        };
+        // A value that is not finite is found where the code runs on it.
+        assert!(cook("heat = 1/(P.y - 1)", "\"P\", \"heat\"").1.unwrap().contains("heat"));
+        let (unused, error) = cook("heat = 1/(P.y - 1)", "\"P\"");
+        assert!(error.is_none() && unused.unwrap().curves().unwrap().point_count() == 2);
+        assert!(cook("heat = nothing", "\"P\"").1.unwrap().contains("nothing"));
+        // Positions are always taken.
+        assert_eq!(cook("P.y = 3; heat = 1", "\"P\"").0.unwrap().curves().unwrap().positions(), [[0.0, 3.0, 0.0]; 2]);
     }
 
     #[test]

@@ -133,6 +133,7 @@ pub(crate) static NODE: Node = Node::new(
 .params(PARAMS)
 .outputs(&[&OUT])
 .reads(&[&P, &ENVELOPE, &PREF, &GUST_DIR])
+.reads_if_there(&[&GUST_DIR])
 .writes(&[&P])
 .attributes(|params| group::attributes(params, &[GROUP, CLUMP]))
 .metrics(METRICS)

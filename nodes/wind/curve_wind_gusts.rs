@@ -194,7 +194,7 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
     if let Some(gust) = gust.filter(|_| wanted) {
         curves.set(GUST, gust)?;
     }
-    if !shears && cx.wants(GUST_DIR) && curves.get(GUST_DIR).is_none() {
+    if !shears && cx.needs(GUST_DIR) && curves.get(GUST_DIR).is_none() {
         let none = vec![[0.0; 3]; curves.point_count()];
         curves.set(GUST_DIR, none)?;
     }

@@ -20,6 +20,7 @@ mod same_bits;
 mod stats;
 #[cfg(unix)]
 mod stopped;
+mod stored_studies;
 mod study;
 mod study_extremes;
 mod targets;

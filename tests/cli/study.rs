@@ -144,6 +144,34 @@ fn a_method_of_lower_order_than_declared_is_caught() {
     assert!(order(&euler) < 1.2 && euler.contains("declared 2: lower than declared"), "{euler}");
 }
 
+/// A block of thick liquid that slumps.
+const SLUMP: &str = r#"{
+  "convect": 1,
+  "scene": { "frames": [1, 3], "fps": 6 },
+  "nodes": {
+    "block": { "type": "Mesh_Primitive", "params": { "shape": "box", "size": [0.4, 0.4, 0.4], "divisions": 1 } },
+    "solve": { "type": "FluidSolve", "inputs": { "liquid": ["block"] }, "params": { "cell": 0.05, "viscosity": 300,
+               "domain_from": [-0.7, -0.2, -0.7], "domain_to": [0.7, 0.4, 0.7] } }
+  },
+  "outputs": { "drop": "solve" }
+}"#;
+
+/// FluidSolve declares no order: the surface is as good as its cells, and what a substep errs is not a pure power of its length.
+#[test]
+fn the_error_of_a_liquid_falls_with_its_cells_and_its_substeps() {
+    let bench = Bench::with_graph(SLUMP);
+    // Of first order in the cells: e = C·(h − h of the reference).
+    let cells = study(&bench, &["--norm", "surface", "--knob", "solve.cell=0.1,0.07,0.05,0.035"]);
+    assert_eq!(cells["reference"]["settings"]["solve.cell"], json!(0.0245));
+    let share = |(run, cell): (usize, f64)| cells["runs"][run]["error"]["mean"].as_f64().unwrap() / (cell - 0.0245);
+    let shares = [(0, 0.1), (1, 0.07), (2, 0.05)].map(share);
+    assert!(shares.iter().all(|share| (0.7..1.4).contains(&(share / shares[1]))), "{shares:?}");
+    let more = ["--norm", "surface", "--set", "solve.viscosity=100", "--knob", "solve.cfl=2,1,0.5,0.25"];
+    let found = study(&bench, &more);
+    let means: Vec<f64> = (0..4).map(|run| found["runs"][run]["error"]["mean"].as_f64().unwrap()).collect();
+    assert!(means.windows(2).all(|pair| pair[1] < pair[0]) && means[3] < 0.6 * means[0], "{means:?}");
+}
+
 #[test]
 fn one_level_finer_moves_no_error_by_more_than_the_floor() {
     let bench = Bench::with_graph(SWING);

@@ -25,7 +25,7 @@ type Move = fn([f32; 3]) -> [f32; 3];
 
 /// What a row does to the inputs.
 #[derive(Clone, Copy)]
-enum Change {
+pub(crate) enum Change {
     Nothing,
     /// The last point of every input.
     Last(f32),
@@ -81,7 +81,7 @@ const ROWS: [(&str, &str, Option<Kind>, Change); 19] = [
 ];
 
 /// The inputs, which are given; and the nodes that some inputs need.
-const SOURCES: &str = r#"
+pub(crate) const SOURCES: &str = r#"
     "curves": { "type": "Curve_In", "params": { "points": [[0, 0, 0], [0, 1, 0]] } },
     "mesh": { "type": "Mesh_Primitive" },
     "tets": { "type": "Tet_In", "params": { "points": [[0, 0, 0]] } },
@@ -95,7 +95,7 @@ const SOURCES: &str = r#"
               "params": { "cell": 0.1, "domain_from": [-0.4, -0.4, -0.4], "domain_to": [0.4, 0.4, 0.4] } },"#;
 
 /// The wire of each input of a node.
-fn wire(node: &str, input: &str) -> &'static str {
+pub(crate) fn wire(node: &str, input: &str) -> &'static str {
     match input {
         // Goals are for the body of a surface.
         "body" if node == "Softbody_Goal" => "lump",
@@ -112,7 +112,7 @@ fn wire(node: &str, input: &str) -> &'static str {
 }
 
 /// Params without which a node has nothing to do.
-fn needed(node: &str) -> &'static str {
+pub(crate) fn needed(node: &str) -> &'static str {
     match node {
         "Curve_In" => r#""points": [[0, 0, 0], [0, 1, 0], [0, 2, 0]]"#,
         "Point_In" => r#""points": [[0, 0, 0], [0, 1, 0]]"#,
@@ -232,14 +232,24 @@ fn inputs() -> [(&'static str, Kind, Component); 4] {
 
 /// What came of a graph.
 #[derive(PartialEq)]
-struct Cooked {
+pub(crate) struct Cooked {
     results: Vec<Option<Arc<Geometry>>>,
-    errors: Vec<(ErrorKind, String)>,
+    pub(crate) errors: Vec<(ErrorKind, String)>,
     /// What nodes say of their metrics.
     notes: Vec<String>,
 }
 
-fn cook(mut graph: Graph, node: &Node, change: Change, threads: usize) -> Cooked {
+fn cook(graph: Graph, node: &Node, change: Change, threads: usize) -> Cooked {
+    let last = match node.cook {
+        Cook::Pure(_) => 1,
+        Cook::Solver(..) => page::frames(3),
+        _ => 3,
+    };
+    cook_for(graph, node, change, threads, last)
+}
+
+/// Cooks frames 1…`last` of a graph with changed inputs; notes are those of `node`.
+pub(crate) fn cook_for(mut graph: Graph, node: &Node, change: Change, threads: usize, last: i64) -> Cooked {
     for (id, kind, part) in inputs() {
         let geometry: Geometry = changed(part, kind, change).into();
         let place = graph.nodes.iter().position(|node| *node.id == *id).unwrap();
@@ -248,11 +258,6 @@ fn cook(mut graph: Graph, node: &Node, change: Change, threads: usize) -> Cooked
     if let Change::Rate(fps) = change {
         graph.scene.fps = fps;
     }
-    let last = match node.cook {
-        Cook::Pure(_) => 1,
-        Cook::Solver(..) => page::frames(3),
-        _ => 3,
-    };
     let frames: Vec<Frame> = (1..=last).map(Frame::whole).collect();
     let engine = Engine::new(&Settings { threads, ..Settings::default() }).unwrap();
     let (found, report) = cook_all(&engine, &graph, &frames);
@@ -265,7 +270,7 @@ fn cook(mut graph: Graph, node: &Node, change: Change, threads: usize) -> Cooked
 }
 
 /// The outcome and its figure, or what is wrong.
-fn judged(cooked: &Cooked) -> Result<(Outcome, String), String> {
+pub(crate) fn judged(cooked: &Cooked) -> Result<(Outcome, String), String> {
     for (kind, said) in &cooked.errors {
         if !matches!(kind, ErrorKind::Refused | ErrorKind::NotFinite) {
             return Err(said.clone());
@@ -331,7 +336,7 @@ fn rows() {
 }
 
 /// A number as a graph writes it.
-fn json(value: &Value) -> Option<String> {
+pub(crate) fn json(value: &Value) -> Option<String> {
     match value {
         Value::Float(x) | Value::Masked(x, _) => Some(format!("{x:?}")),
         Value::Int(x) => Some(x.to_string()),

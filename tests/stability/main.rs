@@ -13,6 +13,7 @@ mod liquid;
 #[path = "../softbody/measure.rs"]
 mod measure;
 mod page;
+mod random;
 #[allow(dead_code, reason = "the tables use part of it")]
 #[path = "../softbody/scene.rs"]
 mod scene;

@@ -43,6 +43,8 @@ pub struct Cx<'a> {
     pub(crate) params: Params,
     pub(crate) inputs: Vec<(&'static str, InputData)>,
     pub(crate) live: Option<&'a [Name]>,
+    /// Those of `live` that need not be there.
+    pub(crate) if_there: &'a [Name],
     pub(crate) cancel: &'a AtomicBool,
     pub(crate) ceiling: Ceiling,
     /// Bytes of the results that a frame holds already.
@@ -90,6 +92,12 @@ impl Cx<'_> {
     /// Whether anything downstream, or an output, reads that attribute of this node's result.
     pub fn wants<T: Item>(&self, attribute: Attr<T>) -> bool {
         self.wants_named(attribute.name)
+    }
+
+    /// Whether a neutral value of that attribute must be written too: it is wanted, and not only by nodes that take a missing
+    /// one for neutral ([`Node::reads_if_there`]).
+    pub fn needs<T: Item>(&self, attribute: Attr<T>) -> bool {
+        self.wants(attribute) && self.if_there.iter().all(|name| **name != *attribute.name)
     }
 
     /// As [`Cx::wants`], for an attribute given by name.

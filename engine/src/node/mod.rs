@@ -132,6 +132,8 @@ pub struct Node {
     pub outputs: &'static [&'static Output],
     /// Attributes read.
     pub reads: &'static [&'static dyn AttrDecl],
+    /// Those of them that it takes for neutral where they are missing; see [`Node::reads_if_there`].
+    pub if_there: &'static [&'static dyn AttrDecl],
     /// Attributes written. All others pass through from the inputs.
     pub writes: &'static [&'static dyn AttrDecl],
     /// Attributes read and written that depend on the params, in addition to the above.
@@ -174,6 +176,7 @@ impl Node {
             params: &[],
             outputs: &[],
             reads: &[],
+            if_there: &[],
             writes: &[],
             attributes: None,
             changes_topology: false,
@@ -221,6 +224,14 @@ impl Node {
     #[must_use]
     pub const fn writes(mut self, attributes: &'static [&'static dyn AttrDecl]) -> Self {
         self.writes = attributes;
+        self
+    }
+
+    /// Those of [`Node::reads`] whose absence means the same as their neutral value: a node before it need not write them
+    /// only because this one reads them ([`Cx::needs`]).
+    #[must_use]
+    pub const fn reads_if_there(mut self, attributes: &'static [&'static dyn AttrDecl]) -> Self {
+        self.if_there = attributes;
         self
     }
 

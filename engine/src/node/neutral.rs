@@ -43,7 +43,7 @@ impl Fill {
         Self { number: Number::Int(attribute, value), keep: false }
     }
 
-    /// Zero vectors where the attribute is missing, as long as anyone takes it; what is there passes through.
+    /// Zero vectors where the attribute is missing, as long as anyone needs it ([`Cx::needs`]); what is there passes through.
     pub const fn missing_vectors(attribute: Attr<[f32; 3]>) -> Self {
         Self { number: Number::Vector(attribute), keep: true }
     }
@@ -52,7 +52,7 @@ impl Fill {
         match self.number {
             Number::Float(attribute, value) => self.fill(cx, part, attribute, value),
             Number::Int(attribute, value) => self.fill(cx, part, attribute, value),
-            Number::Vector(attribute) if !cx.wants(attribute) => Ok(()),
+            Number::Vector(attribute) if !cx.needs(attribute) => Ok(()),
             Number::Vector(attribute) => self.fill(cx, part, attribute, [0.0; 3]),
         }
     }

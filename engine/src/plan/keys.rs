@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::history::{gauss_points, history_start};
 use super::segments::{Anchors, ChainSegment, LEAST_SPACING, Window, segment};
-use super::{Moment, Plan, Reads};
+use super::{Moment, Plan, PlannedNode, Reads};
 use crate::error::{CookError, Error, ErrorKind, Result};
 use crate::graph::Body;
 use crate::key::{ContentKey, Hasher};
@@ -188,10 +188,11 @@ impl<'p, 'g> Keys<'p, 'g> {
 
     /// Completes a key by the attributes that are used of the node's result.
     fn finish_with_live(&mut self, node: usize) -> ContentKey {
-        let live = &self.plan.nodes[node].live;
+        let PlannedNode { live, if_there, .. } = &self.plan.nodes[node];
         let names = live.as_deref().unwrap_or_default();
         let hasher = self.hasher.tag(u8::from(live.is_some())).i64(names.len() as i64);
-        names.iter().fold(hasher, |hasher, name| hasher.text(name)).finish()
+        let hasher = names.iter().fold(hasher, |hasher, name| hasher.text(name)).i64(if_there.len() as i64);
+        if_there.iter().fold(hasher, |hasher, name| hasher.text(name)).finish()
     }
 
     /// Keys of all results that are read, or those that are missing.

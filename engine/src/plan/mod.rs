@@ -69,6 +69,8 @@ pub(crate) struct PlannedNode<'g> {
     pub(crate) read_at_start: bool,
     /// Attributes of its result that are used downstream; `None`: all.
     pub(crate) live: Option<Vec<Name>>,
+    /// Those of them that need not be there: all who read them take a missing one for neutral.
+    pub(crate) if_there: Vec<Name>,
     /// Whether a window or solver depends on it, which asks for every frame in turn.
     pub(crate) feeds_chain: bool,
     pub(crate) resolver: Resolver<'g>,
@@ -202,6 +204,7 @@ impl<'g> PlannedNode<'g> {
             may_hold: false,
             read_at_start: false,
             live: None,
+            if_there: Vec::new(),
             feeds_chain: false,
             resolver: Resolver::lazy(node, graph, files),
         }
@@ -251,6 +254,7 @@ fn plan_node<'g>(
         requested: false,
         read_at_start: false,
         live: None,
+        if_there: Vec::new(),
         feeds_chain: false,
     }
 }

@@ -1,9 +1,11 @@
 //! Memory: what is kept and dropped, and results that do not depend on threads or memory.
 
-use engine::geometry::{Geometry, Owner};
+use engine::geometry::{Geometry, Kind, Owner};
+use engine::inputs;
+use engine::node::{Cook, Input, Node, Output};
 
 use crate::builder::{Cooked, TestGraph, engine};
-use crate::nodes::{ADD, BOUNCE, CLOCK, DUSTY, FOLLOW, SOURCE, SUM, UNSURE_NODE};
+use crate::nodes::{ADD, BOUNCE, CLOCK, DUST, DUSTY, FOLLOW, SOURCE, SUM, UNSURE_NODE};
 
 fn dusty(attributes: Option<Vec<engine::geometry::Name>>) -> Cooked {
     let mut graph = TestGraph::new(1, 2);
@@ -30,6 +32,44 @@ fn an_attribute_that_nothing_reads_is_dropped() {
     assert_eq!(none.node("dusty").metrics["wanted"].values().next(), Some(&0.0));
     let other = dusty(Some(vec!["colour".into()]));
     assert!(!has_dust(other.geometry(1.0)));
+}
+
+inputs! { SWEEP_INPUTS: SWEEP_POINTS: Input = Input::one("points", Kind::Points, "Points."); }
+const SWEPT: Output = Output::like("points", &SWEEP_POINTS, "The points.");
+
+/// Reads `dust` where it is there.
+static SWEEP: Node = Node::new(
+    "Sweep",
+    1,
+    "Reads `dust` where it is there.",
+    Cook::Pure(|cx| Ok(SWEPT.with(cx.input(SWEEP_POINTS).clone()))),
+)
+.inputs(SWEEP_INPUTS)
+.outputs(&[&SWEPT])
+.reads(&[&DUST])
+.reads_if_there(&[&DUST]);
+
+#[test]
+fn an_attribute_that_is_read_only_where_it_is_there_is_wanted_but_not_needed() {
+    let metrics = |attributes: &[&str], also_itself: bool| {
+        let mut graph = TestGraph::new(1, 1);
+        let a = graph.add("a", &SOURCE).done();
+        let dusty = graph.add("dusty", &DUSTY).wire("points", a).done();
+        let sweep = graph.add("sweep", &SWEEP).wire("points", dusty).done();
+        graph.output(sweep).attributes = Some(attributes.iter().map(|name| (*name).into()).collect());
+        if also_itself {
+            graph.output(dusty).attributes = Some(vec!["dust".into()]);
+        }
+        let cooked = graph.cook([1]);
+        ["wanted", "needed"].map(|metric| cooked.node("dusty").metrics[metric].values().next().copied())
+    };
+    assert_eq!(metrics(&[], false), [Some(1.0), Some(0.0)]);
+    assert_eq!(
+        metrics(&["dust"], false),
+        [Some(1.0); 2],
+        "an output that names it has it, through the node that reads it"
+    );
+    assert_eq!(metrics(&[], true), [Some(1.0); 2]);
 }
 
 #[test]

@@ -293,6 +293,8 @@ pub(crate) static FAIL: Node = Node::new(
 /// An attribute that is only needed if something downstream reads it.
 pub(crate) const DUST: Attr<f32> = Attr::point("dust");
 const WANTED: Metric = Metric::new("wanted", Unit::None, "1 if something downstream reads `dust`.");
+const NEEDED: Metric =
+    Metric::new("needed", Unit::None, "1 if something downstream reads `dust` even if it is neutral.");
 inputs! { DUSTY_INPUTS: DUSTY_POINTS: Input = POINTS; }
 
 /// Writes `dust`.
@@ -302,6 +304,7 @@ pub(crate) static DUSTY: Node = Node::new(
     "Writes `dust`.",
     Cook::Pure(|cx| {
         cx.publish(WANTED, f64::from(u8::from(cx.wants(DUST))));
+        cx.publish(NEEDED, f64::from(u8::from(cx.needs(DUST))));
         let mut geometry = cx.input(DUSTY_POINTS).clone();
         if let Some(points) = geometry.part_mut(engine::geometry::Kind::Points) {
             let rows = points.point_count();
@@ -312,7 +315,7 @@ pub(crate) static DUSTY: Node = Node::new(
 )
 .inputs(DUSTY_INPUTS)
 .outputs(&[&OUT])
-.metrics(&[&WANTED])
+.metrics(&[&WANTED, &NEEDED])
 .writes(&[&DUST]);
 
 const UNSURE: Metric = Metric::new("unsure", Unit::None, "Infinite at frame 2, undefined at frame 3.");

@@ -1,7 +1,7 @@
 //! Which cells of a lattice are stored: rows along x, each a list of spans, without gaps in the arrays.
 //!
-//! Promise: memory and time follow the cells, not the box around them: 4 bytes a row of the box and 12 bytes a span
-//! besides the values. A field on the rows is a plain slice with one value a cell, in the order of z, then y, then x, so
+//! Promise: memory and time follow the cells, not the box in which they are looked for: 4 bytes for each row of the
+//! smallest box that holds them, and 12 bytes a span besides the values. A field on the rows is a plain slice with one value a cell, in the order of z, then y, then x, so
 //! loops along a span have unit stride.
 
 use std::cmp::{max, min};
@@ -51,7 +51,7 @@ impl RowSpan {
 /// Cells that one thread tabulates, about.
 const TABULATED: usize = 4096;
 
-/// A set of cells. Spans of a row ascend and do not touch.
+/// A set of cells. Spans of a row ascend and do not touch. The first and the last row along y and along z have cells.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CellRows {
     /// y and z of the first row.
@@ -66,6 +66,22 @@ pub struct CellRows {
 
 /// A span with the y and z of its row.
 pub type PlacedSpan = ([i32; 2], RowSpan);
+
+/// For each z, the number of spans of each row along y, and the spans.
+type Slices = [(Vec<u32>, Vec<Range<i32>>)];
+
+/// The rows along y and along z outside which there are no spans; `None` where there is none.
+fn filled(slices: &Slices) -> Option<(Range<usize>, Range<usize>)> {
+    let has_spans = |(_, spans): &(_, Vec<_>)| !spans.is_empty();
+    let (first, last) = (slices.iter().position(has_spans)?, slices.iter().rposition(has_spans)?);
+    let (mut start, mut end) = (usize::MAX, 0);
+    for (counts, _) in &slices[first..=last] {
+        // Only rows that can widen the range are looked at.
+        start = min(start, counts.iter().take(start).position(|n| *n > 0).unwrap_or(start));
+        end = max(end, counts.iter().skip(end).rposition(|n| *n > 0).map_or(end, |y| end + y + 1));
+    }
+    Some((start..end, first..last + 1))
+}
 
 /// What pushes the cells of row (y, z), as half-open ranges of x.
 type RowFill<'a> = dyn Fn(i32, i32, &mut Vec<Range<i32>>) + Sync + 'a;
@@ -94,9 +110,12 @@ impl CellRows {
             }
             (counts, spans)
         });
-        let mut rows = Self { low, size, first: vec![0], ..Self::default() };
-        for (counts, spans) in slices {
-            for count in counts {
+        let Some((ys, zs)) = filled(&slices) else { return Self::default() };
+        let low = [low[0] + ys.start as i32, low[1] + zs.start as i32];
+        let mut rows = Self { low, size: [ys.len() as i32, zs.len() as i32], first: vec![0], ..Self::default() };
+        // Rows outside have no spans.
+        for (counts, spans) in slices.into_iter().skip(zs.start).take(zs.len()) {
+            for count in &counts[ys.clone()] {
                 let last = rows.first[rows.first.len() - 1];
                 rows.first.push(last + count);
             }

@@ -97,6 +97,8 @@ impl Stock {
     fn take(&mut self, file: &Path, bytes: Vec<u8>) -> Result<(), String> {
         let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
         match file.extension().and_then(|ending| ending.to_str()) {
+            // Runs of a study, which is no graph.
+            Some("json") if name == "study.json" => {}
             Some("json") => {
                 let text = plain_json(&String::from_utf8_lossy(&bytes));
                 let mut graph: Value =

@@ -197,6 +197,7 @@ impl<'g> Sweep<'_, 'g, '_> {
             params: reads.params.clone(),
             inputs,
             live: self.plan.nodes[node].live.as_deref(),
+            if_there: &self.plan.nodes[node].if_there,
             cancel: self.cancel,
             clock: scene.clock(),
             origin: scene.origin,

@@ -3,7 +3,7 @@
 //! Conservative: boxes of regions are rounded outwards.
 
 use numerics::lanes::LANES;
-use numerics::simd::kernel;
+use numerics::simd::{Path, kernel};
 use numerics::vector::{DVec3, Vec3};
 
 /// A low and a high corner.
@@ -38,6 +38,58 @@ fn bounds_body(points: &[Vec3]) -> Bounds {
     low.iter().zip(high).fold(NOWHERE, |bounds, (low, high)| join(bounds, [*low, *high]))
 }
 
+kernel! {
+    /// The least coordinate of finite points along each axis: half of their bounds, for less than half the instructions.
+    fn lowest_of(points: &[Vec3]) -> Vec3 = lowest_body;
+}
+
+#[inline(always)]
+fn lowest_body(points: &[Vec3]) -> Vec3 {
+    let (whole, rest) = points.as_flattened().as_chunks::<FLOATS>();
+    let mut low = [f32::INFINITY; FLOATS];
+    for floats in whole {
+        for i in 0..FLOATS {
+            low[i] = if low[i] < floats[i] { low[i] } else { floats[i] };
+        }
+    }
+    for (i, float) in rest.iter().enumerate() {
+        low[i] = low[i].min(*float);
+    }
+    low.as_chunks::<3>().0.iter().fold(NOWHERE[0], |low, one| [0, 1, 2].map(|axis| low[axis].min(one[axis])))
+}
+
+kernel! {
+    /// The greatest coordinate of finite points along each axis.
+    fn highest_of(points: &[Vec3]) -> Vec3 = highest_body;
+}
+
+#[inline(always)]
+fn highest_body(points: &[Vec3]) -> Vec3 {
+    let (whole, rest) = points.as_flattened().as_chunks::<FLOATS>();
+    let mut high = [f32::NEG_INFINITY; FLOATS];
+    for floats in whole {
+        for i in 0..FLOATS {
+            high[i] = if high[i] > floats[i] { high[i] } else { floats[i] };
+        }
+    }
+    for (i, float) in rest.iter().enumerate() {
+        high[i] = high[i].max(*float);
+    }
+    high.as_chunks::<3>().0.iter().fold(NOWHERE[1], |high, one| [0, 1, 2].map(|axis| high[axis].max(one[axis])))
+}
+
+/// Whether all points, which are finite, are on one side of a box, the one on which the first point is.
+pub(super) fn all_beside(path: Path, points: &[Vec3], [low, high]: &Bounds) -> bool {
+    let Some(first) = points.first() else { return true };
+    if let Some(axis) = (0..3).find(|axis| first[*axis] > high[*axis]) {
+        lowest_of(path, points)[axis] > high[axis]
+    } else if let Some(axis) = (0..3).find(|axis| first[*axis] < low[*axis]) {
+        highest_of(path, points)[axis] < low[axis]
+    } else {
+        false
+    }
+}
+
 /// The union with other bounds.
 fn join([low, high]: Bounds, [other_low, other_high]: Bounds) -> Bounds {
     [[0, 1, 2].map(|k| low[k].min(other_low[k])), [0, 1, 2].map(|k| high[k].max(other_high[k]))]
@@ -59,6 +111,13 @@ impl Boxes {
             self.low[axis].push(((centre[axis] - reach[axis]) as f32).next_down());
             self.high[axis].push(((centre[axis] + reach[axis]) as f32).next_up());
         }
+    }
+
+    /// The bounds of all boxes.
+    pub(super) fn bounds(&self) -> Bounds {
+        let least = |of: &Vec<f32>| of.iter().fold(f32::INFINITY, |least, x| least.min(*x));
+        let largest = |of: &Vec<f32>| of.iter().fold(f32::NEG_INFINITY, |largest, x| largest.max(*x));
+        [self.low.each_ref().map(least), self.high.each_ref().map(largest)]
     }
 
     /// Number of boxes.

@@ -21,7 +21,7 @@ mod shear;
 
 use block::block_values;
 pub use control::{AXIS_ROWS, Control, ControlShape, outline};
-use cull::{Boxes, bounds_of, meeting};
+use cull::{Bounds, Boxes, all_beside, bounds_of, meeting};
 pub use draw::{Draw, Gust, Living, MOST_LIVING};
 pub use launch::Plane;
 use numerics::parallel;
@@ -152,6 +152,8 @@ struct Prepared<'a> {
     ramps: Vec<Profile>,
     /// Bounds of the regions, spheres first.
     boxes: Boxes,
+    /// Bounds of all of them.
+    reach: Bounds,
     /// No influence is negative, so a point that has reached 1 stays there.
     only_adds: bool,
 }
@@ -175,11 +177,15 @@ impl<'a> Prepared<'a> {
         let falloff_adds = gusts.spheres.is_empty() || gusts.falloff.min() >= 0.0;
         let only_adds = falloff_adds && gusts.controls.iter().all(Control::only_adds);
         let ramps = gusts.controls.iter().map(|control| Profile::new(control.ramp())).collect();
-        Self { gusts, falloff: Profile::new(gusts.falloff), ramps, boxes, only_adds }
+        let reach = boxes.bounds();
+        Self { gusts, falloff: Profile::new(gusts.falloff), ramps, boxes, reach, only_adds }
     }
 
     /// The regions that may reach any of a task's points.
     fn near(&self, path: Path, points: &[[f32; 3]]) -> Boxes {
+        if all_beside(path, points, &self.reach) {
+            return Boxes::default();
+        }
         meeting(path, &self.boxes, &bounds_of(path, points))
     }
 

@@ -109,3 +109,16 @@ fn cells_around_within_a_box_are_those_around_that_it_holds() {
     let within = rows.dilated_within(2000, [-2; 3], [12; 3]);
     assert_eq!(within.len(), 14 * 14 * 14);
 }
+
+#[test]
+fn rows_without_cells_around_a_set_are_not_stored() {
+    let cells = ragged();
+    let tight = CellRows::from_cells(&cells);
+    let wide = CellRows::cuboid([-40; 3], [50; 3]).filtered(|cell, _| cells.contains(&cell));
+    assert_eq!(wide, tight, "the same set, whatever box it was looked for in");
+    assert_eq!((wide.low, wide.size), ([-9, -9], [16, 14]));
+    for by in [1, 2] {
+        assert_eq!(wide.dilated(by), tight.dilated(by));
+    }
+    assert_eq!(CellRows::cuboid([0; 3], [9; 3]).filtered(|_, _| false), CellRows::default());
+}

@@ -188,3 +188,25 @@ fn gusts_blow_to_their_sides_by_their_influence() {
         }
     }
 }
+
+#[test]
+fn points_on_one_side_of_all_gusts_are_told_apart_from_those_near_one() {
+    let gusts = [[-2.0, -1.0, 0.0], [-1.0, 0.0, 1.0]];
+    let all = |points: &[[f32; 3]]| all_beside(Path::chosen(), points, &gusts);
+    let points = hairs(40);
+    for axis in 0..3 {
+        for side in [-30.0, 30.0] {
+            let moved =
+                |by: f32| points.iter().map(move |p| [0, 1, 2].map(|k| p[k] + if k == axis { by } else { 0.0 }));
+            let far: Vec<[f32; 3]> = moved(side).collect();
+            assert!(all(&far), "{axis} {side}");
+            // The first, one of the groups of sixteen, one of the rest.
+            for within in [0, 37, far.len() - 1] {
+                let mut near = far.clone();
+                near[within] = [-1.5, -0.5, 0.5];
+                assert!(!all(&near), "{axis} {side} {within}");
+            }
+        }
+    }
+    assert!(all(&[]));
+}
