@@ -12,6 +12,7 @@ mod slurm;
 
 use std::path::PathBuf;
 
+use engine::graph::Graph;
 use engine::plan::Request;
 
 use crate::args::{PartRange, Setting};
@@ -124,9 +125,15 @@ pub fn run(args: &JobArgs) -> Result<(), Failure> {
     }
     let wedges = args.wedge.as_ref().map(wedges).transpose()?;
     let engine = load::engine(0, memory::ceiling(None))?;
-    let mut set = args.set.clone();
-    set.extend(wedges.iter().flat_map(|wedges| Some(Setting(wedges.key.clone(), wedges.values.first()?.clone()))));
-    let graph = load::graph(&args.graph, &set)?.map_err(|faults| load::faulty(&args.graph, &faults))?;
+    let with = |last: Option<Setting>| {
+        let set: Vec<Setting> = args.set.iter().cloned().chain(last).collect();
+        load::graph(&args.graph, &set)?.map_err(|faults| load::faulty(&args.graph, &faults))
+    };
+    // A value that does not fit would be found by each of its tasks.
+    let settings = wedges.iter().flat_map(|wedges| wedges.values.iter().map(|value| (&wedges.key, value)));
+    let graphs = settings.map(|(key, value)| with(Some(Setting(key.clone(), value.clone()))));
+    let graphs = graphs.collect::<Result<Vec<Graph>, Failure>>()?;
+    let graph = graphs.into_iter().next().map_or_else(|| with(None), Ok)?;
     let frames = engine::frames::FrameSet::whole(graph.scene.first, graph.scene.last);
     let request = Request { outputs: load::outputs(&graph, &[])?, frames: frames.iter().take(cut::PLANNED).collect() };
     let report = engine.rehearse(&graph, &request);
@@ -174,7 +181,13 @@ fn wedges(Setting(key, values): &Setting) -> Result<Wedges, Failure> {
             let line = format!("`{wrong}` of --wedge cannot be the name of a folder; write numbers or words");
             Err(Failure::new(Exit::CommandLine, line))
         }
-        None => Ok(Wedges { key: key.clone(), values: listed }),
+        None => match listed.iter().enumerate().find(|(n, value)| listed[..*n].contains(value)) {
+            Some((_, twice)) => {
+                let line = format!("`{twice}` is twice in --wedge, and would be cooked twice into one folder");
+                Err(Failure::new(Exit::CommandLine, line))
+            }
+            None => Ok(Wedges { key: key.clone(), values: listed }),
+        },
     }
 }
 
@@ -198,7 +211,7 @@ mod tests {
         assert_eq!(of("0.2, 0.4").unwrap(), ["0.2", "0.4"]);
         assert_eq!(of("[[1,0,0],[0,0,1]]").unwrap(), ["[1,0,0]", "[0,0,1]"]);
         assert_eq!(of("perlin,billow").unwrap(), ["perlin", "billow"]);
-        assert!(of("a/b").is_err() && of("").is_err());
+        assert!(of("a/b").is_err() && of("").is_err() && of("1,2,1").is_err());
     }
 
     #[test]

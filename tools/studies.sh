@@ -20,11 +20,13 @@ cvs=3,5,9,17,33
 
 # How finely curves are cut.
 study attribute_expr --knob grass.cvs=$cvs --norm surface
+study attribute_transfer --knob fur.cvs=$cvs --norm surface --frames 1-12x4
 study curve_attach --knob hair.cvs=$cvs --norm surface --frames 1-24x4
 study curve_deform --knob guides.cvs=$cvs --norm surface --frames 1-24x8
 study curve_interpolate --knob fur.cvs=$cvs --norm surface --frames 1-24x8
 study curve_resample --knob grass.cvs=$cvs --norm surface
 study curve_scatter --output hair --knob hair.cvs=$cvs --norm surface
+study curve_trim --knob fur.cvs=$cvs --norm surface --frames 1-24x8
 study curve_wind_shielding --knob fur.cvs=$cvs --norm surface --frames 1-24x8
 study grass --set blades.density=400 --knob blades.cvs=$cvs --norm surface --frames 1-48x8
 study grass_gusts --set blades.density=400 --knob blades.cvs=$cvs --norm surface --frames 1-48x8

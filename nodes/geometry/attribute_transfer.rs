@@ -3,8 +3,10 @@
 //! Each row takes the value of the nearest row of `source`, or, with a `radius`, the mean of those within it, with weights
 //! (1 − (d ÷ `radius`)²)². Points take from points, elements from elements: a curve is where its root is, a face or tet
 //! where the mean of its corners is. Of whole numbers, and of `orient`, there is no mean: the nearest counts. Where nothing
-//! is within the radius a row keeps what it has, or is 0.
+//! is within the radius a row keeps what it has; without the attribute it has its neutral value, such as an `envelope` of 1,
+//! or 0.
 
+use engine::geometry::ColumnType;
 use engine::prelude::*;
 use numerics::parallel::{self, CHUNK};
 use numerics::point_tree::{FoundPoint, PointTree};
@@ -28,8 +30,8 @@ params! { PARAMS:
     ATTRIBUTES: Param<Arc<Vec<Name>>> = Param::texts("attributes", &[], "Names of the attributes.").fixed();
     FROM: Param<From> = Param::choice("from", From::Points, "Whether they are attributes of points or of elements.").fixed();
     RADIUS: Param<f32> = Param::float("radius", 0.0,
-        "Distance within which values are averaged, the nearer the more. What is farther from all of `source` keeps its \
-         value. 0 takes the nearest value, however far it is.")
+        "Distance within which values are averaged, the nearer the more; of whole numbers the nearest counts. What is \
+         farther from all of `source` keeps its value. 0 takes the nearest value, however far it is.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 1.0);
 }
 
@@ -41,7 +43,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Attribute_Transfer",
-    1,
+    2,
     "Copies attributes from another geometry by position: masks painted on a mesh to the fur on it, or groups of a groom to \
      another one. Takes the nearest value, or a mean of those within `radius`.",
     Cook::Pure(cook),
@@ -85,9 +87,14 @@ fn cook(cx: &Cx) -> Result<Outputs> {
                 continue;
             }
             let near = near(&tree, &rows, cx.get(RADIUS));
-            unreached += near.iter().filter(|near| near.is_empty()).count();
-            let before = own.table(owner).column(name).filter(|before| before.kind() == column.kind());
-            let column = taken(name, column, before, &near);
+            let missed = near.iter().filter(|near| near.is_empty()).count();
+            unreached += missed;
+            let before = own.table(owner).column(name);
+            if let Some(before) = before.filter(|before| missed > 0 && before.kind() != column.kind()) {
+                return Err(of_another_type(name, before.kind(), column.kind(), missed));
+            }
+            let before = before.cloned().or_else(|| own.neutral(owner, name));
+            let column = taken(name, column, before.filter(|before| before.kind() == column.kind()), &near);
             own.set_column(owner, name.clone(), column)?;
         }
     }
@@ -104,6 +111,13 @@ fn found<'g>(source: &'g Geometry, owner: Owner, name: &str) -> Result<(&'g Comp
         let hint = if other { "set `from` to what has it" } else { "wire the geometry that has it into `source`" };
         Error::refused(format!("no {rows} of `source` have the attribute `{name}`")).hint(hint).of("attributes")
     })
+}
+
+/// Rows that keep their values, which the attribute from `source` cannot hold.
+fn of_another_type(name: &str, own: ColumnType, source: ColumnType, rows: usize) -> Error {
+    let fact =
+        format!("`{name}` is {own} in `geometry` and {source} in `source`, and {rows} rows would keep their own");
+    Error::refused(fact).hint("set `radius` to 0, or give the attribute in `source` another name").of("radius")
 }
 
 /// Where rows are.
@@ -144,8 +158,8 @@ fn near(tree: &PointTree, places: &[[f32; 3]], radius: f32) -> Vec<Vec<(u32, f64
 }
 
 /// An attribute's values for rows that take from these of `column`; those that take from none have that of `before`, or 0.
-fn taken(name: &str, column: &Column, before: Option<&Column>, near: &[Vec<(u32, f64)>]) -> Column {
-    let whole = column.concat(&before.cloned().unwrap_or_else(|| Column::zeros(column.kind(), near.len())));
+fn taken(name: &str, column: &Column, before: Option<Column>, near: &[Vec<(u32, f64)>]) -> Column {
+    let whole = column.concat(&before.unwrap_or_else(|| Column::zeros(column.kind(), near.len())));
     let all = whole.unwrap_or_else(|| column.clone());
     // Rows of `before` follow those of the source.
     let nearest =
@@ -236,6 +250,25 @@ mod tests {
         assert_eq!((out.curves().get(MASK), out.metrics["unreached"]), (Some(&[0.0, 0.0, 0.0][..]), 2.0));
         let kept = bench(&NODE).input(GEOMETRY, own).input(SOURCE, source()).set(ATTRIBUTES, names(&["mask"]));
         assert_eq!(kept.set(RADIUS, 0.2).cook().curves().get(MASK), Some(&[0.0, 7.0, 7.0][..]));
+    }
+
+    #[test]
+    fn what_keeps_its_value_keeps_it_whatever_its_type() {
+        let mut own = hair();
+        own.set(Attr::<i32>::point("mask"), vec![7; 3]).unwrap();
+        let bench = bench(&NODE).input(GEOMETRY, own).input(SOURCE, source()).set(ATTRIBUTES, names(&["mask"]));
+        let error = bench.clone().set(RADIUS, 0.2).try_cook().unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "`mask` is int in `geometry` and float in `source`, and 2 rows would keep their own; set `radius` to 0, or give \
+             the attribute in `source` another name"
+        );
+        assert_eq!(bench.cook().curves().get(MASK), Some(&[0.0, 0.0, 30.0][..]));
+        let mut shelter = Component::points(vec![[0.1, 0.0, 0.0]]);
+        shelter.set(ENVELOPE, vec![0.25]).unwrap();
+        let out = self::bench(&NODE).input(GEOMETRY, hair()).input(SOURCE, shelter);
+        let out = out.set(ATTRIBUTES, names(&["envelope"])).set(RADIUS, 0.2).cook();
+        assert_eq!(out.curves().get(ENVELOPE), Some(&[0.25, 1.0, 1.0][..]));
     }
 
     #[test]

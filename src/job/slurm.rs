@@ -74,13 +74,18 @@ pub(super) fn text(job: &Job) -> String {
         if !wedges.is_empty() {
             let _ = writeln!(text, "        wedge=${{wedges[index / {}]}}", parts.len());
         }
-        let _ = writeln!(text, "        run {}\n        ;;", double_quoted(&job.cook(step, "$part", &places)));
+        let _ = writeln!(
+            text,
+            "        run {}\n        ;;",
+            double_quoted(&job.cook(step, "$part", &places), &job.settings)
+        );
     }
     text += "    merge)\n";
     if !wedges.is_empty() {
         text += "        wedge=${wedges[index]}\n";
     }
-    let _ = writeln!(text, "        run {}\n        ;;\n    esac\n    exit 2\nfi", double_quoted(&job.merge(&places)));
+    let _ =
+        writeln!(text, "        run {}\n        ;;\n    esac\n    exit 2\nfi", double_quoted(&job.merge(&places), &[]));
     text += SUBMIT;
     let runs = wedges.len().max(1);
     for (at, step) in job.cut.steps.iter().enumerate() {
@@ -104,9 +109,9 @@ pub(super) fn text(job: &Job) -> String {
     text
 }
 
-/// Words in which variables are replaced.
-fn double_quoted(words: &[String]) -> String {
-    let quoted = |word: &String| match word.contains('$') {
+/// Words in which variables are replaced, but in those of `settings`.
+fn double_quoted(words: &[String], settings: &[String]) -> String {
+    let quoted = |word: &String| match word.contains('$') && !settings.contains(word) {
         true => format!("\"{word}\""),
         false => quoted(word),
     };

@@ -208,6 +208,13 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
     // Ends the bar, before anything else is printed.
     let Subject { progress, fixed, .. } = subject;
     drop(progress);
+    let reversed = found.knobs.iter().zip(&found.stored.reversed).filter(|(_, reversed)| **reversed && !args.quiet);
+    for (knob, _) in reversed {
+        let key = &knob.key;
+        crate::say!(
+            "note: the first value of `{key}` counts as the best, as it takes longer than the last; if it is not, give them in the other order"
+        );
+    }
     let mut outcome = Outcome {
         graph: load::graph_name(&args.graph),
         output: name,

@@ -254,6 +254,10 @@ impl UsdStage {
                 other => match other.strip_prefix("primvars:") {
                     Some(rest) if !rest.ends_with(":indices") => {
                         let name = own.unwrap_or_else(|| rest.to_owned());
+                        // What a schema has of its own counts.
+                        if name == "P" || name == "v" && has("velocities") || name == "width" && has("widths") {
+                            continue;
+                        }
                         let role = self.role(prim, other, &name)?;
                         (name, role)
                     }

@@ -137,14 +137,14 @@ impl Faces {
             {
                 continue;
             }
-            if self.cross(from, cvs[k + 1]) {
+            if self.meets(from, cvs[k + 1]) {
                 *suspect = k;
                 return true;
             }
             if k == 0
                 && let Some(outside) = outside
                 && outside != from
-                && self.cross(outside, from)
+                && self.meets(outside, from)
             {
                 *suspect = 0;
                 return true;
@@ -155,7 +155,7 @@ impl Faces {
 
     /// Whether one of them crosses the segment from `a` to `b`.
     #[inline(always)]
-    fn cross(&self, a: Vec3, b: Vec3) -> bool {
+    fn meets(&self, a: Vec3, b: Vec3) -> bool {
         let (mut left, mut first) = (self.count, None);
         for (block, (low, high)) in self.blocks.iter().zip(&self.boxes) {
             let lanes = if left >= LANES { u16::MAX } else { (1 << left) - 1 };
