@@ -13,7 +13,7 @@ use super::goals::{GoalHistory, Goals};
 use super::measured::measured;
 use super::setup::{MaterialFields, ParticleNumber, SimulationSetup, StartInputs, refusal};
 use super::{
-    BODY_COLLISION, COLLIDERS, COUPLING_BREAK, DEEPEST_OVERLAP, DEEPEST_PENETRATION, DRAG, FRICTION, GOAL_DISTANCE,
+    BODY_COLLISION, BOUNCE, COLLIDERS, COUPLING_BREAK, DEEPEST_OVERLAP, DEEPEST_PENETRATION, DRAG, FRICTION, GOAL_DISTANCE,
     GOAL_ON, GOALS, GRAVITY, GROUND, GROUND_HEIGHT, IDLE_PINS, IDLE_PINS_POINT, IDLE_PINS_WIRE, INITIAL_VELOCITY,
     INTEGRATOR, KEEP_DENTS, LET_GO, PINNED, PINS, PLASTIC_CREEP, PLASTIC_WORK, PLASTIC_YIELD, POINTS_INSIDE,
     RESET_ENERGY, RESET_FRAMES, RESET_TO_GOALS, SELF_COLLISION, SEPARATION_FRAMES, START_FRAME, STARTED_INSIDE,
@@ -215,6 +215,7 @@ impl Run {
                 Stepping::Euler => Integrator::Euler,
             },
             substeps: cx.get(SUBSTEPS) as u32,
+            bounce: Some(f64::from(cx.get(BOUNCE))).filter(|share| *share >= 0.0),
             force_implicit_euler: influences.goals.reset_at(interval.frames[0], whole, frames),
             cancelled: &|| cx.check_cancelled().is_err(),
         };

@@ -22,6 +22,9 @@ const CG_SHARE: f64 = 0.1;
 /// That with contacts and a line search, where more Newton iterations follow anyway. With 0.2 those of stiff bodies that
 /// hit a surface do not find their loads of friction.
 const CG_SHARE_LINE_SEARCH: f64 = 0.17;
+/// That with contacts between bodies, which the coarse system contains. It is measured in the norm of the preconditioner, in
+/// which motions of whole bodies count most: what a looser solve leaves of the others costs more Newton iterations.
+const CG_SHARE_STACKED: f64 = 0.1;
 /// That with contacts whose state is frozen: nothing corrects it later, so slip would drift and piles would jump.
 const CG_SHARE_FROZEN: f64 = 0.02;
 /// Noise in the rotation of free pieces that a linear solve may leave, as a fraction of their rotational energy: it
@@ -125,6 +128,9 @@ pub(super) struct StageSolver {
     /// Tetrahedra watched since the start of the step, and the latest full check.
     pub(super) inventory: Inventory,
     pub(super) latest_inventory: Option<Inventory>,
+    /// Lengths of springs at the start of the step, and as last measured; of torn ones any. Metres.
+    pub(super) lengths: Vec<f64>,
+    pub(super) lengths_now: Vec<f64>,
     pub(super) offset_from_centroid: Vec<Vec3>,
     /// Springs of the current stage.
     pub(super) links: Vec<Link>,
@@ -334,6 +340,7 @@ impl StageSolver {
         let in_contact = !stage.contacts.is_empty();
         let asked = match (in_contact, stage.line_search) {
             (false, _) => CG_SHARE,
+            (true, true) if self.system.anchors < self.system.transient.len() => CG_SHARE_STACKED,
             (true, true) => CG_SHARE_LINE_SEARCH,
             (true, false) => CG_SHARE_FROZEN,
         };
