@@ -255,8 +255,8 @@ fn cut(
     /// once for it.
     const IMPACT_ERROR: f64 = 0.1;
     const MOST_PARTS: f64 = 16.0;
-    /// Share of inverted tetrahedra above which a step crushes a body.
-    const CRUSHED: f64 = 0.1;
+    /// Energy ÷ (E × volume) above which a body is crushed.
+    const CRUSHED: f64 = 10.0;
     /// Newton iterations of a frame after which steps are no longer cut for that.
     const MOST_NEWTON_OF_IMPACTS: u32 = 300;
     let start = stepper.start(motion);
@@ -267,7 +267,7 @@ fn cut(
     let no_help = share <= SHORT && stepped.solved.unmet > HELPS * deepest;
     let frame = stepper.frame;
     // What is crushed, or starts out of balance, does not bounce.
-    let crushed = f64::from(stepper.solver.inventory.inverted) > CRUSHED * stepper.context.body.tets.len() as f64;
+    let crushed = energies.scale() > CRUSHED * stepper.context.body.modulus_times_volume();
     let bounces = frame.integrator == Integrator::Default
         && frame.bounce != Some(0.0)
         && !(frame.force_implicit_euler || turned || crushed || stepped.jammed > 0)
