@@ -2,6 +2,8 @@ use super::*;
 use conformance::{Bench, BenchResult, bench, conformance, cook_all};
 use engine::cook::{Engine, Settings};
 
+mod bounce;
+
 const G: f64 = 9.81;
 /// Seconds of a frame.
 const H: f64 = 1.0 / 24.0;
