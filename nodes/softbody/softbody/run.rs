@@ -201,6 +201,7 @@ impl Run {
             || scene.body_contact.is_some()
             || scene.self_contact.is_some();
         let (whole, frames) = (f64::from(cx.get(RESET_TO_GOALS)), cx.get(RESET_FRAMES) as f64);
+        let pushed = scene.separation.is_some_and(|apart| !apart.overlaps.is_empty() && apart.over < apart.frames);
         let frame = SolverFrame {
             seconds: interval.seconds,
             gravity: cx.get(GRAVITY).map(f64::from),
@@ -215,7 +216,8 @@ impl Run {
                 Stepping::Euler => Integrator::Euler,
             },
             substeps: cx.get(SUBSTEPS) as u32,
-            bounce: Some(f64::from(cx.get(BOUNCE))).filter(|share| *share >= 0.0),
+            // What is pushed apart does not bounce.
+            bounce: if pushed { Some(0.0) } else { Some(f64::from(cx.get(BOUNCE))).filter(|share| *share >= 0.0) },
             force_implicit_euler: influences.goals.reset_at(interval.frames[0], whole, frames),
             cancelled: &|| cx.check_cancelled().is_err(),
         };

@@ -116,6 +116,7 @@ fn it_conforms() {
             alone.set(BODY_COLLISION, false).set(SELF_COLLISION, false).set(INTEGRATOR, Stepping::Accurate)
         })
         .with(move |bench| rich(bench).set(THICKNESS, 0.09).set(GOAL_ON, GoalOn::All))
+        .with(move |bench| rich(bench).set(BOUNCE, 0.0))
         .run();
 }
 

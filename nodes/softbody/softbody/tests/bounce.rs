@@ -20,7 +20,8 @@ fn dropped(bounce: f32) -> Vec<f64> {
     frames.iter().map(middle).collect()
 }
 
-/// It falls for 15.3 frames. With a speed of b·√(2gh) it comes back to b²·h, up to what it moves between two frames.
+/// It falls for 15.3 frames. With a speed of b·√(2gh) it comes back to b²·h, up to what it moves between two frames. Up to
+/// four steps after an impact are implicit Euler, which falls by ½gh² more than it should in each.
 #[test]
 fn a_dropped_cube_comes_back_to_the_height_that_bounce_gives() {
     for bounce in [0.0, 0.2, 0.3] {
@@ -28,7 +29,8 @@ fn a_dropped_cube_comes_back_to_the_height_that_bounce_gives() {
         let apex = heights[17..].iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let expected = 2.0 * f64::from(bounce) * f64::from(bounce);
         println!("bounce {bounce}: {apex:.4} m of {expected:.4} m");
-        assert!((apex - expected).abs() < 0.5 * G * 0.25 * H * H + 0.04 * expected + 1e-3, "{bounce}: {heights:?}");
+        let (more, less) = (0.04 * expected + 1e-3, if bounce > 0.0 { 4.0 * 0.5 * G * H * H } else { 0.0 });
+        assert!((-less - more..more).contains(&(apex - expected)), "{bounce}: {heights:?}");
     }
     let material = dropped(-1.0)[17..].iter().copied().fold(f64::NEG_INFINITY, f64::max);
     println!("as the material lets it: {material:.4} m");
