@@ -216,8 +216,8 @@ impl Run {
                 Stepping::Euler => Integrator::Euler,
             },
             substeps: cx.get(SUBSTEPS) as u32,
-            // What is pushed apart does not bounce.
-            bounce: if pushed { Some(0.0) } else { Some(f64::from(cx.get(BOUNCE))).filter(|share| *share >= 0.0) },
+            // What is pushed apart comes apart evenly.
+            bounce: if pushed { Some(f64::INFINITY) } else { Some(f64::from(cx.get(BOUNCE))).filter(|share| *share >= 0.0) },
             force_implicit_euler: influences.goals.reset_at(interval.frames[0], whole, frames),
             cancelled: &|| cx.check_cancelled().is_err(),
         };

@@ -116,7 +116,9 @@ fn it_conforms() {
             alone.set(BODY_COLLISION, false).set(SELF_COLLISION, false).set(INTEGRATOR, Stepping::Accurate)
         })
         .with(move |bench| rich(bench).set(THICKNESS, 0.09).set(GOAL_ON, GoalOn::All))
-        .with(move |bench| rich(bench).set(BOUNCE, 0.0))
+        .with(move |bench| {
+            rich(bench).set(COUPLING_RADIUS, 0.05).set(COUPLING_STIFFNESS, 0.1).set(GRAVITY, [0.0, -200.0, 0.0])
+        })
         .run();
 }
 

@@ -50,7 +50,7 @@ pub struct SolverFrame<'a> {
     /// Number of steps; 0: one, cut repeatedly where contacts stay too deep, and for impacts that bounce.
     pub substeps: u32,
     /// The largest speed at which bodies leave what they hit ÷ the speed at which they approached it; `None`: what the
-    /// material gives. With 0 impacts are not resolved.
+    /// material gives. With 0 or infinity impacts take no further steps.
     pub bounce: Option<f64>,
     /// Whether to step with implicit Euler throughout: for frames that start out of balance, for example after rest
     /// lengths changed.
@@ -269,7 +269,7 @@ fn cut(
     // What is crushed, or starts out of balance, does not bounce.
     let crushed = energies.scale() > CRUSHED * stepper.context.body.modulus_times_volume();
     let bounces = frame.integrator == Integrator::Default
-        && frame.bounce != Some(0.0)
+        && frame.bounce.is_none_or(|bounce| bounce > 0.0 && bounce.is_finite())
         && !(frame.force_implicit_euler || turned || crushed || stepped.jammed > 0)
         && report.newton < MOST_NEWTON_OF_IMPACTS;
     let parts = if bounces { (stepped.impact_error / IMPACT_ERROR).clamp(1.0, MOST_PARTS) } else { 1.0 };
