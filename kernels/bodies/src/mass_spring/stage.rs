@@ -22,9 +22,6 @@ const CG_SHARE: f64 = 0.1;
 /// That with contacts and a line search, where more Newton iterations follow anyway. With 0.2 those of stiff bodies that
 /// hit a surface do not find their loads of friction.
 const CG_SHARE_LINE_SEARCH: f64 = 0.17;
-/// That with contacts between bodies, which the coarse system contains. It is measured in the norm of the preconditioner, in
-/// which motions of whole bodies count most: what a looser solve leaves of the others costs more Newton iterations.
-const CG_SHARE_STACKED: f64 = 0.1;
 /// That with contacts whose state is frozen: nothing corrects it later, so slip would drift and piles would jump.
 const CG_SHARE_FROZEN: f64 = 0.02;
 /// Noise in the rotation of free pieces that a linear solve may leave, as a fraction of their rotational energy: it
@@ -340,7 +337,6 @@ impl StageSolver {
         let in_contact = !stage.contacts.is_empty();
         let asked = match (in_contact, stage.line_search) {
             (false, _) => CG_SHARE,
-            (true, true) if self.system.anchors < self.system.transient.len() => CG_SHARE_STACKED,
             (true, true) => CG_SHARE_LINE_SEARCH,
             (true, false) => CG_SHARE_FROZEN,
         };
