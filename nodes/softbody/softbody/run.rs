@@ -217,7 +217,11 @@ impl Run {
             },
             substeps: cx.get(SUBSTEPS) as u32,
             // What is pushed apart comes apart evenly.
-            bounce: if pushed { Some(f64::INFINITY) } else { Some(f64::from(cx.get(BOUNCE))).filter(|share| *share >= 0.0) },
+            bounce: if pushed {
+                Some(f64::INFINITY)
+            } else {
+                Some(f64::from(cx.get(BOUNCE))).filter(|share| *share >= 0.0)
+            },
             force_implicit_euler: influences.goals.reset_at(interval.frames[0], whole, frames),
             cancelled: &|| cx.check_cancelled().is_err(),
         };

@@ -124,7 +124,9 @@ impl Stepper<'_> {
         motion.acceleration = motion.v.iter().zip(&start.v).map(acceleration).collect();
         motion.loads = self.loads(&full, |contact| contact.load_at(&motion.x));
         self.keep_finite(&start, motion, &mut stepped);
-        let slowed = self.frame.bounce.and_then(|bounce| self.limit_bounce(bounce, &full, &start, motion, h));
+        // Infinity is no limit, not even times an approach of 0.
+        let bounce = self.frame.bounce.filter(|bounce| bounce.is_finite());
+        let slowed = bounce.and_then(|bounce| self.limit_bounce(bounce, &full, &start, motion, h));
         self.refresh_inventory(motion);
         stepped.after = match after.filter(|_| stepped.stopped == 0 && slowed.is_none()) {
             Some(energies) => energies,
