@@ -51,7 +51,7 @@ impl Touch {
         let mut weights: BTreeMap<[usize; 2], f64> = BTreeMap::new();
         for contact in contacts {
             let depth = -contact.clearance(x, 0.0);
-            if !(depth > 0.0) {
+            if depth.is_nan() || depth <= 0.0 {
                 continue;
             }
             let side = |first: bool| contact.sides().find(move |side| (side.1 > 0.0) == first);
