@@ -127,6 +127,11 @@ params! { PARAMS:
     FRICTION: Param<Maskable> = Param::maskable("friction", 0.5,
         "Coefficient of friction: at 0 bodies slide freely, at 1 they stick to a slope of 45 degrees.")
         .at_least(0.0).soft(0.0, 1.0);
+    BOUNCE: Param<f32> = Param::float("bounce", -1.0,
+        "The largest speed at which a body leaves what it hits, relative to the speed at which it approached: at 0 it does \
+         not bounce, at 0.5 it comes back to a quarter of the height at most. Below 0 it bounces as its stiffness and \
+         damping let it. Except at 0, impacts take more time steps.")
+        .within(-1.0, 1.0);
     SELF_COLLISION: Param<bool> = Param::bool("self_collision", true, "Whether bodies collide with themselves.");
     BODY_COLLISION: Param<bool> = Param::bool("body_collision", true, "Whether bodies collide with each other.");
     GROUND: Param<bool> = Param::bool("ground", false, "Whether there is a level ground. Colliders never push \
@@ -182,6 +187,9 @@ metrics! { METRICS:
         "Elastic energy that plastic flow dissipates at the end of the frame; it is no longer part of the next frame's \
          `elastic`.");
     ENERGY_SHED = Metric::new("energy_shed", Unit::Joules, "Energy removed to prevent a spurious gain.");
+    ENERGY_LOST = Metric::new("energy_lost", Unit::Joules,
+        "Energy that the frame lost in other ways than by `damping`, `drag` and `friction`: by time stepping, by contacts \
+         and by `bounce`. More `substeps` lose less.");
     VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume relative to the rest volume.")
         .warn_outside(0.9, 1.1, "The bodies lose or gain more than a tenth of their volume. Raise `volume`, or \
             `stiffness`; look for colliders that squeeze them into too small a space.");
@@ -256,7 +264,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
-    5,
+    6,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
      other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
      pins hold them. `stiffness` has the same effect at any mesh resolution, and the solver is stable for any \

@@ -13,11 +13,11 @@ use super::goals::{GoalHistory, Goals};
 use super::measured::measured;
 use super::setup::{MaterialFields, ParticleNumber, SimulationSetup, StartInputs, refusal};
 use super::{
-    BODY_COLLISION, COLLIDERS, COUPLING_BREAK, DEEPEST_OVERLAP, DEEPEST_PENETRATION, DRAG, FRICTION, GOAL_DISTANCE,
-    GOAL_ON, GOALS, GRAVITY, GROUND, GROUND_HEIGHT, IDLE_PINS, IDLE_PINS_POINT, IDLE_PINS_WIRE, INITIAL_VELOCITY,
-    INTEGRATOR, KEEP_DENTS, LET_GO, PINNED, PINS, PLASTIC_CREEP, PLASTIC_WORK, PLASTIC_YIELD, POINTS_INSIDE,
-    RESET_ENERGY, RESET_FRAMES, RESET_TO_GOALS, SELF_COLLISION, SEPARATION_FRAMES, START_FRAME, STARTED_INSIDE,
-    STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS, TIME_SCALE, TOLERANCE, VOLUME,
+    BODY_COLLISION, BOUNCE, COLLIDERS, COUPLING_BREAK, DEEPEST_OVERLAP, DEEPEST_PENETRATION, DRAG, FRICTION,
+    GOAL_DISTANCE, GOAL_ON, GOALS, GRAVITY, GROUND, GROUND_HEIGHT, IDLE_PINS, IDLE_PINS_POINT, IDLE_PINS_WIRE,
+    INITIAL_VELOCITY, INTEGRATOR, KEEP_DENTS, LET_GO, PINNED, PINS, PLASTIC_CREEP, PLASTIC_WORK, PLASTIC_YIELD,
+    POINTS_INSIDE, RESET_ENERGY, RESET_FRAMES, RESET_TO_GOALS, SELF_COLLISION, SEPARATION_FRAMES, START_FRAME,
+    STARTED_INSIDE, STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS, TIME_SCALE, TOLERANCE, VOLUME,
 };
 use super::{obstacles, pins};
 
@@ -201,6 +201,7 @@ impl Run {
             || scene.body_contact.is_some()
             || scene.self_contact.is_some();
         let (whole, frames) = (f64::from(cx.get(RESET_TO_GOALS)), cx.get(RESET_FRAMES) as f64);
+        let pushed = scene.separation.is_some_and(|apart| !apart.overlaps.is_empty() && apart.over < apart.frames);
         let frame = SolverFrame {
             seconds: interval.seconds,
             gravity: cx.get(GRAVITY).map(f64::from),
@@ -215,6 +216,12 @@ impl Run {
                 Stepping::Euler => Integrator::Euler,
             },
             substeps: cx.get(SUBSTEPS) as u32,
+            // What is pushed apart comes apart evenly.
+            bounce: if pushed {
+                Some(f64::INFINITY)
+            } else {
+                Some(f64::from(cx.get(BOUNCE))).filter(|share| *share >= 0.0)
+            },
             force_implicit_euler: influences.goals.reset_at(interval.frames[0], whole, frames),
             cancelled: &|| cx.check_cancelled().is_err(),
         };

@@ -48,6 +48,7 @@ const BARE: SolverFrame<'static> = SolverFrame {
     contacts: None,
     integrator: bodies::mass_spring::Integrator::Default,
     substeps: 0,
+    bounce: None,
     force_implicit_euler: false,
     cancelled: &|| false,
 };

@@ -231,6 +231,11 @@ impl SoftBody {
         self.size
     }
 
+    /// Σ E·V over the tetrahedra, joules.
+    pub(super) fn modulus_times_volume(&self) -> f64 {
+        self.volumes.iter().zip(&self.moduli).map(|(volume, modulus)| volume * modulus).sum()
+    }
+
     /// E ÷ (ρgh) of the piece that carries its own weight worst, with h its height at rest along `gravity`, m/s²;
     /// infinite without weight.
     pub fn stiffness_to_weight(&self, gravity: [f64; 3]) -> f64 {

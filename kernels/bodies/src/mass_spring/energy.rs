@@ -15,6 +15,9 @@ pub(super) struct Energies {
     pub(super) goals: f64,
     /// Potential energy of gravity relative to the origin.
     pub(super) height: f64,
+    /// Σ c·(change of length since the start of the step)² over the dashpots of springs, J·s: divided by the length of
+    /// the step, the least energy that they may have taken.
+    pub(super) dashed: f64,
 }
 
 impl Energies {
@@ -45,9 +48,17 @@ pub(super) fn measure(
     let watched = &solver.inventory.watched;
     let thin: f64 = solver.volumes.thin_tets(body, x, context.volumes, watched).iter().map(|thin| thin.energy).sum();
     let stored = solver.volumes.stored;
-    let springs = body.spring_partition.sum((), |part, ()| {
-        body.spring_partition.range(part).map(|at| springs::energy(body, &context.rest, x, at)).sum()
+    let (rest, before, now) = (&context.rest, &solver.lengths, &mut solver.lengths_now);
+    now.resize(body.ends.len(), 0.0);
+    let springs = body.spring_partition.map(&mut now[..], |part, now: &mut [f64]| {
+        let range = body.spring_partition.range(part);
+        range.zip(now).filter(|(at, _)| rest.is_intact(*at as u32)).fold([0.0; 2], |[stored, dashed], (at, now)| {
+            *now = springs::spring_length(body, x, at);
+            let change = *now - before.get(at).copied().unwrap_or(*now);
+            [stored + springs::stored(body, rest, at, *now), dashed + body.damping[at] * change * change]
+        })
     });
+    let [springs, dashed] = springs.into_iter().fold([0.0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
     let clusters = &body.order.clusters;
     let own = clusters.map((), |cluster, ()| {
         clusters.range(cluster).fold([0.0; 3], |[kinetic, goals, height], particle| {
@@ -61,7 +72,7 @@ pub(super) fn measure(
     });
     let [kinetic, goals, height] =
         own.into_iter().fold([0.0; 3], |sum, part| [sum[0] + part[0], sum[1] + part[1], sum[2] + part[2]]);
-    Energies { kinetic, springs, volumes: stored + thin, goals, height }
+    Energies { kinetic, springs, volumes: stored + thin, goals, height, dashed }
 }
 
 /// The largest of stretch and compression, length ÷ rest length or its reciprocal, over springs with a rest length.

@@ -77,14 +77,15 @@ impl Stepper<'_> {
         deepest(&self.contacts(motion, &motion.x, [time; 2]), &motion.x)
     }
 
-    /// A step of implicit Euler; `damped` if it starts out of balance by more than its contacts.
+    /// A step of implicit Euler; `damped` if it starts out of balance by more than its contacts. Returns the estimated
+    /// errors of positions too.
     pub(super) fn euler(
         &mut self,
         motion: &mut Kinematics,
         times: [f64; 2],
         contacts: &mut Vec<ContactConstraint>,
         damped: bool,
-    ) -> (Solved, f64) {
+    ) -> (Solved, Vec<DVec3>) {
         let h = (times[1] - times[0]) * self.seconds;
         let mut z = motion.x.clone();
         let y: Vec<DVec3> = motion.x.iter().zip(&motion.v).map(|(x, v)| x + v * h).collect();
@@ -132,9 +133,9 @@ impl Stepper<'_> {
         }
         let v: Vec<DVec3> = x.iter().zip(&z).map(|(x, z)| (x - z) / h).collect();
         // First-order estimate: the change of velocity acts a whole step late.
-        let estimate = v.iter().zip(&motion.v).map(|(v, before)| 0.5 * h * (v - before).norm()).fold(0.0, f64::max);
+        let errors = v.iter().zip(&motion.v).map(|(v, before)| (v - before) * (0.5 * h)).collect();
         (motion.x, motion.v) = (x, v);
-        (solved, estimate)
+        (solved, errors)
     }
 
     /// Estimate of the squared residual of free motion from `x` to `y` plus gravity and obstacle motion in `h`.

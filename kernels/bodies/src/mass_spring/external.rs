@@ -145,6 +145,23 @@ impl ExternalForces {
         self.goal(particle).map_or(0.0, |goal| 0.5 * goal.strength * (lerp(&goal.between, time) - x).norm_squared())
     }
 
+    /// Work on a particle that moved by `dx` to `x` in a step of `h` seconds that ended at `time`: that of drag, of a
+    /// goal's dashpot and of a goal's motion. Gravity and springs of goals have potentials instead. Joules.
+    pub(super) fn work(&self, particle: usize, mass: f64, [time, h]: [f64; 2], x: DVec3, dx: DVec3) -> f64 {
+        let mut sum = -self.drag * dx.norm_squared() / h;
+        if let Some(goal) = self.goal(particle) {
+            let moved = self.velocity(&goal.between) * h;
+            sum += goal.strength * (lerp(&goal.between, time) - x).dot(&moved);
+            sum += goal.damping * (moved - dx).dot(&dx) / h;
+        }
+        sum * mass
+    }
+
+    /// The pinned particles that move.
+    pub(super) fn moving_pins(&self) -> impl Iterator<Item = usize> {
+        self.pins.iter().filter(|(_, between)| between[0] != between[1]).map(|(particle, _)| *particle as usize)
+    }
+
     #[inline(always)]
     fn goal(&self, particle: usize) -> Option<&Track> {
         self.goals.get(*self.goal_of.get(particle)? as usize)

@@ -47,8 +47,11 @@ pub struct SolverFrame<'a> {
     pub contacts: Option<&'a dyn ContactFinder>,
     /// Time integration.
     pub integrator: Integrator,
-    /// Number of steps; 0: one, halved repeatedly where contacts stay too deep or errors too large.
+    /// Number of steps; 0: one, cut repeatedly where contacts stay too deep, and for impacts that bounce.
     pub substeps: u32,
+    /// The largest speed at which bodies leave what they hit ÷ the speed at which they approached it; `None`: what the
+    /// material gives. With 0 or infinity impacts take no further steps.
+    pub bounce: Option<f64>,
     /// Whether to step with implicit Euler throughout: for frames that start out of balance, for example after rest
     /// lengths changed.
     pub force_implicit_euler: bool,
@@ -68,6 +71,7 @@ impl Default for SolverFrame<'_> {
             contacts: None,
             integrator: Integrator::Default,
             substeps: 0,
+            bounce: None,
             force_implicit_euler: false,
             cancelled: &|| false,
         }
@@ -102,6 +106,9 @@ pub struct FrameReport {
     pub goal_energy: f64,
     /// Energy removed to prevent a spurious gain, joules.
     pub energy_removed: f64,
+    /// Energy lost in other ways than by damping, drag and friction, joules: by time stepping, by contacts, and by limits
+    /// on bounces and energy.
+    pub energy_lost: f64,
     /// Volume ÷ rest volume.
     pub volume_ratio: f64,
     /// The largest length ÷ rest length of a spring, or its reciprocal.
@@ -176,7 +183,9 @@ impl BodySolver {
             Kinematics { x: vectors(&state.positions), v: vectors(&state.velocities), acceleration, loads };
         let mut report = FrameReport::default();
         self.solver.inventory = Inventory::new(body, &motion.x, &state.volumes);
+        self.solver.lengths.clear();
         let mut energies = measure(&mut self.solver, &context, 0.0, &motion, false);
+        self.solver.lengths.clone_from(&self.solver.lengths_now);
         if seconds > 0.0 && !body.is_empty() {
             let mut stepper = Stepper {
                 solver: &mut self.solver,
@@ -186,6 +195,7 @@ impl BodySolver {
                 cached: &mut state.cached,
                 euler_steps_left: &mut state.euler_steps_left,
                 energy_budget: &mut state.energy_budget,
+                impacts: &mut state.impacts,
             };
             run(&mut stepper, &mut motion, &mut energies, &mut report);
         }
@@ -213,22 +223,21 @@ fn run(stepper: &mut Stepper<'_>, motion: &mut Kinematics, energies: &mut Energi
         return adapt(stepper, motion, energies, report, tolerance);
     }
     if stepper.frame.substeps == 0 {
-        return halve(stepper, motion, energies, report, [0.0, 1.0], f64::INFINITY);
+        return cut(stepper, motion, energies, report, [0.0, 1.0], f64::INFINITY);
     }
     let steps = stepper.frame.substeps.min(MOST_STEPS);
     for step in (0..steps).take_while(|_| !(stepper.frame.cancelled)()) {
         let times = [f64::from(step) / f64::from(steps), f64::from(step + 1) / f64::from(steps)];
         let stepped = stepper.step(motion, times, energies, accurate);
-        *energies = stepped.after;
-        add(report, &stepped);
+        accept(stepper, report, energies, &stepped);
         let allowed = accurate.map_or(f64::INFINITY, |tolerance| tolerance * (times[1] - times[0]));
         report.tolerance_missed += u32::from(stepped.estimate > allowed);
     }
 }
 
-/// Takes one step between `times`, or two halves of it if contacts stay too deep. Short steps are only halved further
-/// if that reduces the depth below `deepest`, metres.
-fn halve(
+/// Takes one step between `times`, or two halves of it if contacts stay too deep, or several parts if it loses much of
+/// a bounce. Short steps are only cut further for deep contacts if that reduces the depth below `deepest`, metres.
+fn cut(
     stepper: &mut Stepper<'_>,
     motion: &mut Kinematics,
     energies: &mut Energies,
@@ -240,25 +249,42 @@ fn halve(
     const HELPS: f64 = 0.9;
     /// Steps longer than this fraction of the frame are always halved.
     const SHORT: f64 = 1.0 / 16.0;
-    /// Newton iterations of a frame after which remaining depths are accepted, so that the frame ends.
+    /// Newton iterations of a frame after which steps are accepted, so that the frame ends.
     const MOST_NEWTON: u32 = 400;
+    /// Relative error of the speed of a body in contact, and the largest number of parts into which a step is cut at
+    /// once for it.
+    const IMPACT_ERROR: f64 = 0.1;
+    const MOST_PARTS: f64 = 16.0;
+    /// Energy ÷ (E × volume) above which a body is crushed.
+    const CRUSHED: f64 = 10.0;
+    /// Newton iterations of a frame after which steps are no longer cut for that.
+    const MOST_NEWTON_OF_IMPACTS: u32 = 300;
     let start = stepper.start(motion);
+    let turned = stepper.solver.inventory.inverted > 0;
     let stepped = stepper.step(motion, times, energies, None);
     let unmet = stepped.solved.unmet > 0.0 || stepped.solved.failed;
     let share = times[1] - times[0];
     let no_help = share <= SHORT && stepped.solved.unmet > HELPS * deepest;
-    let hopeless = no_help || report.newton >= MOST_NEWTON;
-    let is_over = (stepper.frame.cancelled)();
-    if !unmet || hopeless || is_over || share <= 1.0 / f64::from(MOST_STEPS) {
-        add(report, &stepped);
-        *energies = stepped.after;
-        return;
+    let frame = stepper.frame;
+    // What is crushed, or starts out of balance, does not bounce.
+    let crushed = energies.scale() > CRUSHED * stepper.context.body.modulus_times_volume();
+    let bounces = frame.integrator == Integrator::Default
+        && frame.bounce.is_none_or(|bounce| bounce > 0.0 && bounce.is_finite())
+        && !(frame.force_implicit_euler || turned || crushed || stepped.jammed > 0)
+        && report.newton < MOST_NEWTON_OF_IMPACTS;
+    let parts = if bounces { (stepped.impact_error / IMPACT_ERROR).clamp(1.0, MOST_PARTS) } else { 1.0 };
+    let parts = (parts.ceil() as u32).next_power_of_two();
+    let is_over = (frame.cancelled)() || report.newton >= MOST_NEWTON || share <= 1.0 / f64::from(MOST_STEPS);
+    if is_over || !(unmet && !no_help || parts > 1) {
+        return accept(stepper, report, energies, &stepped);
     }
     add_work(report, &stepped);
     stepper.restart(start, motion);
-    let middle = 0.5 * (times[0] + times[1]);
-    for half in [[times[0], middle], [middle, times[1]]] {
-        halve(stepper, motion, energies, report, half, stepped.solved.unmet);
+    let parts = parts.min((share * f64::from(MOST_STEPS)) as u32).max(2);
+    let deepest = if unmet { stepped.solved.unmet } else { deepest };
+    let at = |part: u32| times[0] + share * f64::from(part) / f64::from(parts);
+    for part in 0..parts {
+        cut(stepper, motion, energies, report, [at(part), at(part + 1)], deepest);
     }
 }
 
@@ -297,9 +323,8 @@ fn adapt(
             share = share.min(0.5 * (end - time)).max(1.0 / f64::from(MOST_STEPS));
         }
         if fits {
-            add(report, &stepped);
+            accept(stepper, report, energies, &stepped);
             report.tolerance_missed += u32::from(stepped.estimate > allowed);
-            *energies = stepped.after;
             time = end;
         } else {
             add_work(report, &stepped);
@@ -314,12 +339,17 @@ fn add_work(report: &mut FrameReport, stepped: &Stepped) {
     report.cg += stepped.solved.cg;
 }
 
-fn add(report: &mut FrameReport, stepped: &Stepped) {
+/// Keeps the result of a step.
+fn accept(stepper: &mut Stepper<'_>, report: &mut FrameReport, energies: &mut Energies, stepped: &Stepped) {
+    let solver = &mut *stepper.solver;
+    std::mem::swap(&mut solver.lengths, &mut solver.lengths_now);
+    *energies = stepped.after;
     add_work(report, stepped);
     report.caps_hit += stepped.solved.caps + u32::from(stepped.solved.unmet > 0.0);
     report.residual = report.residual.max(stepped.solved.residual);
     report.error_estimate += stepped.estimate;
     report.energy_removed += stepped.energy_removed;
+    report.energy_lost += stepped.energy_lost;
     report.substeps += 1;
     report.euler_steps += u32::from(stepped.euler);
     report.stopped = report.stopped.max(stepped.stopped);

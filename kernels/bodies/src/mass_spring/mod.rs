@@ -17,7 +17,9 @@
 
 mod adjacency;
 mod assemble;
+mod balance;
 mod body;
+mod bounce;
 mod cholesky;
 mod coarse;
 mod conjugate_gradients;

@@ -23,6 +23,9 @@ pub(super) struct RigidMotion {
     acceleration: DVec3,
     /// Kinetic energy of rotation, joules.
     energy: f64,
+    /// 1 ÷ mass, and the inverse of the tensor of inertia; 0 if it is held.
+    inverse_mass: f64,
+    inverse_inertia: DMat3,
 }
 
 impl RigidMotion {
@@ -44,6 +47,8 @@ impl RigidMotion {
             angular_velocity,
             acceleration: DVec3::zeros(),
             energy: 0.0,
+            inverse_mass: 0.0,
+            inverse_inertia: DMat3::zeros(),
         };
         if held[particles.clone()].contains(&true) {
             return still;
@@ -61,8 +66,8 @@ impl RigidMotion {
             tensor += (DMat3::identity() * offset.norm_squared() - offset * offset.transpose()) * m;
         }
         tensor += DMat3::identity() * (NEGLIGIBLE * tensor.trace());
-        match tensor.try_inverse().map(|inverse| inverse * turning) {
-            Some(angular_velocity)
+        match tensor.try_inverse().map(|inverse| (inverse, inverse * turning)) {
+            Some((inverse_inertia, angular_velocity))
                 if angular_velocity.iter().chain(&centroid).chain(&linear_velocity).all(|x| x.is_finite()) =>
             {
                 Self {
@@ -72,6 +77,8 @@ impl RigidMotion {
                     angular_velocity,
                     acceleration,
                     energy: 0.5 * angular_velocity.dot(&turning),
+                    inverse_mass: 1.0 / mass,
+                    inverse_inertia,
                 }
             }
             _ => still,
@@ -84,15 +91,30 @@ impl RigidMotion {
         self.particles.clone().map(|particle| x[particle] * body.mass[particle]).sum::<DVec3>() / mass
     }
 
-    /// The same without rotation.
+    /// The same without rotation, which impulses do not cause either.
     pub(super) fn without_rotation(self) -> Self {
-        Self { angular_velocity: DVec3::zeros(), ..self }
+        Self { angular_velocity: DVec3::zeros(), inverse_inertia: DMat3::zeros(), ..self }
     }
 
     /// With accelerations given as velocities, the force and the torque ÷ radius of gyration that cause them, newtons.
     pub(super) fn force(&self, body: &SoftBody) -> f64 {
         let mass: f64 = body.mass[self.particles.clone()].iter().sum();
         (mass * (mass * self.linear_velocity.norm_squared() + 2.0 * self.energy)).sqrt()
+    }
+
+    /// Speed along `normal` that an impulse of 1 N·s along it at `point` gives that point, 1/kg.
+    pub(super) fn mobility(&self, point: DVec3, normal: DVec3) -> f64 {
+        let arm = (point - self.centroid).cross(&normal);
+        self.inverse_mass + arm.dot(&(self.inverse_inertia * arm))
+    }
+
+    /// The change of its motion by an `impulse` at `point`, N·s.
+    pub(super) fn pushed(&self, point: DVec3, impulse: DVec3) -> Self {
+        Self {
+            linear_velocity: impulse * self.inverse_mass,
+            angular_velocity: self.inverse_inertia * (point - self.centroid).cross(&impulse),
+            ..self.clone()
+        }
     }
 
     /// Velocity at position `x`.

@@ -14,7 +14,7 @@ const HALVINGS: usize = 16;
 /// A line search that took more than this fraction of its step indicates how much decrease is left.
 const LONG: f64 = 0.2;
 /// Newton iterations of a stage without contacts, and with contacts.
-const MOST: u32 = 4;
+const MOST: u32 = 12;
 const MOST_IN_CONTACT: u32 = 60;
 /// The same where obstacles leave no room, so that loads have no balance.
 const MOST_JAMMED: u32 = 20;

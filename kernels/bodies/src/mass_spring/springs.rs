@@ -244,10 +244,13 @@ pub(super) fn linearise(
 /// Elastic energy of spring `at`, joules.
 #[inline(always)]
 pub(super) fn energy(body: &SoftBody, rest: &RestLengths<'_>, x: &[DVec3], at: usize) -> f64 {
-    if !rest.is_intact(at as u32) {
-        return 0.0;
-    }
-    let strain = spring_length(body, x, at) - rest.lengths[at];
+    if rest.is_intact(at as u32) { stored(body, rest, at, spring_length(body, x, at)) } else { 0.0 }
+}
+
+/// The same of an intact spring with this length.
+#[inline(always)]
+pub(super) fn stored(body: &SoftBody, rest: &RestLengths<'_>, at: usize, length: f64) -> f64 {
+    let strain = length - rest.lengths[at];
     0.5 * body.stiffness[at] * strain * strain
 }
 

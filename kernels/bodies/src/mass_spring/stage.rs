@@ -125,6 +125,9 @@ pub(super) struct StageSolver {
     /// Tetrahedra watched since the start of the step, and the latest full check.
     pub(super) inventory: Inventory,
     pub(super) latest_inventory: Option<Inventory>,
+    /// Lengths of springs at the start of the step, and as last measured; of torn ones any. Metres.
+    pub(super) lengths: Vec<f64>,
+    pub(super) lengths_now: Vec<f64>,
     pub(super) offset_from_centroid: Vec<Vec3>,
     /// Springs of the current stage.
     pub(super) links: Vec<Link>,

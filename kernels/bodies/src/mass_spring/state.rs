@@ -1,6 +1,7 @@
 //! The state of a body between frames.
 
 use super::body::SoftBody;
+use super::bounce::Impact;
 use super::cholesky::Lower;
 use super::coarse::ContactFilters;
 use serde::{Deserialize, Serialize};
@@ -31,6 +32,8 @@ pub struct State {
     pub(super) euler_steps_left: u32,
     /// Energy that steps without external driving have dissipated so far, joules.
     pub(super) energy_budget: f64,
+    /// Pieces in contact, if bounces are limited.
+    pub(super) impacts: Vec<Impact>,
     pub(super) cached: CachedCoarseFactor,
 }
 
@@ -60,6 +63,7 @@ impl State {
             loads: Vec::new(),
             euler_steps_left: 0,
             energy_budget: 0.0,
+            impacts: Vec::new(),
             cached: CachedCoarseFactor::default(),
         }
     }

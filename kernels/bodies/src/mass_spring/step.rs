@@ -11,6 +11,7 @@
 //! which contacts change or that failed; it is repeated from its start.
 
 use super::body::SoftBody;
+use super::bounce::Impact;
 use super::contact::{ContactConstraint, ContactMode};
 use super::energy::{Energies, measure};
 use super::frame::{Integrator, SolverFrame};
@@ -36,8 +37,8 @@ pub(super) struct Kinematics {
     pub(super) loads: Vec<f64>,
 }
 
-/// Motion, energy budget and number of steps of implicit Euler left at the start of a step.
-pub(super) type StepStart = (Kinematics, f64, u32);
+/// Motion, energy budget, number of steps of implicit Euler left, and pieces in contact at the start of a step.
+pub(super) type StepStart = (Kinematics, f64, u32, Vec<Impact>);
 
 /// Outcome of a step.
 #[derive(Clone, Copy, Debug, Default)]
@@ -45,9 +46,13 @@ pub(super) struct Stepped {
     pub(super) solved: Solved,
     /// Largest estimated error of a particle, metres.
     pub(super) estimate: f64,
+    /// Estimated error of the speed of a piece in contact, relative to what its energy amounts to.
+    pub(super) impact_error: f64,
     pub(super) euler: bool,
     /// Energy removed to prevent a spurious gain, joules.
     pub(super) energy_removed: f64,
+    /// Energy lost without damping, drag or friction, joules.
+    pub(super) energy_lost: f64,
     pub(super) after: Energies,
     pub(super) contacts: u32,
     pub(super) overlap: f64,
@@ -67,6 +72,8 @@ pub(super) struct Stepper<'a> {
     pub(super) euler_steps_left: &'a mut u32,
     /// Energy that steps have dissipated so far, and that rounding in later ones may return, joules.
     pub(super) energy_budget: &'a mut f64,
+    /// Pieces in contact, if bounces are limited.
+    pub(super) impacts: &'a mut Vec<Impact>,
 }
 
 impl Stepper<'_> {
@@ -93,13 +100,14 @@ impl Stepper<'_> {
         let through = full.iter().any(|contact| contact.is_penetrating(&start.x, h));
         let force_implicit_euler = *self.euler_steps_left > 0 || self.frame.force_implicit_euler || turned || through;
         *self.euler_steps_left = self.euler_steps_left.saturating_sub(1);
-        let (mut stepped, after) = if force_implicit_euler || self.frame.integrator == Integrator::Euler {
+        let (mut stepped, errors, after) = if force_implicit_euler || self.frame.integrator == Integrator::Euler {
             let damped = self.frame.force_implicit_euler || turned;
-            let (solved, estimate) = self.euler(motion, times, &mut full, damped);
-            (Stepped { solved, estimate, euler: true, ..Stepped::default() }, None)
+            let (solved, errors) = self.euler(motion, times, &mut full, damped);
+            (Stepped { solved, euler: true, ..Stepped::default() }, errors, None)
         } else {
             self.tr_bdf2_or_euler(motion, times, before, tolerance, &mut full)
         };
+        stepped.estimate = errors.iter().map(DVec3::norm_squared).fold(0.0, f64::max).sqrt();
         if full.iter().any(|c| (c.clearance(&start.x, h) < 0.0) != (c.clearance(&motion.x, 0.0) < 0.0)) {
             *self.euler_steps_left = (*self.euler_steps_left).max(1);
         }
@@ -116,8 +124,11 @@ impl Stepper<'_> {
         motion.acceleration = motion.v.iter().zip(&start.v).map(acceleration).collect();
         motion.loads = self.loads(&full, |contact| contact.load_at(&motion.x));
         self.keep_finite(&start, motion, &mut stepped);
+        // Infinity is no limit, not even times an approach of 0.
+        let bounce = self.frame.bounce.filter(|bounce| bounce.is_finite());
+        let slowed = bounce.and_then(|bounce| self.limit_bounce(bounce, &full, &start, motion, h));
         self.refresh_inventory(motion);
-        stepped.after = match after.filter(|_| stepped.stopped == 0) {
+        stepped.after = match after.filter(|_| stepped.stopped == 0 && slowed.is_none()) {
             Some(energies) => energies,
             None => measure(self.solver, &self.context, times[1], motion, false),
         };
@@ -126,11 +137,15 @@ impl Stepper<'_> {
         } else {
             *self.energy_budget = 0.0;
         }
+        stepped.impact_error = self.impact_error([&start, motion], &full, &errors, h);
+        stepped.energy_lost =
+            self.energy_lost([before, &stepped.after], &start, motion, &full, times) + slowed.unwrap_or(0.0);
         stepped
     }
 
     /// A step of TR-BDF2 with frozen contacts, repeated with implicit Euler where that fails, gains energy, or the set of
-    /// active contacts or of thin tetrahedra changes. Returns the energies at the end too, if they are known.
+    /// active contacts or of thin tetrahedra changes. Returns the estimated errors of positions and the energies at the
+    /// end too, if they are known.
     fn tr_bdf2_or_euler(
         &mut self,
         motion: &mut Kinematics,
@@ -138,11 +153,11 @@ impl Stepper<'_> {
         before: &Energies,
         tolerance: Option<f64>,
         contacts: &mut Vec<ContactConstraint>,
-    ) -> (Stepped, Option<Energies>) {
+    ) -> (Stepped, Vec<DVec3>, Option<Energies>) {
         let (h, size) = ((times[1] - times[0]) * self.seconds, self.context.body.size);
         let start = motion.clone();
         let frozen: Vec<ContactConstraint> = contacts.iter().map(|c| c.frozen(&start.x, &start.v, h, size)).collect();
-        let (mut solved, estimate) = self.tr_bdf2(motion, times, &frozen, tolerance);
+        let (mut solved, errors) = self.tr_bdf2(motion, times, &frozen, tolerance);
         let energies = measure(self.solver, &self.context, times[1], motion, true);
         let gain = energies.sum() - before.sum();
         let gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
@@ -155,23 +170,23 @@ impl Stepper<'_> {
         let thinned = active_set_unchanged && self.watch_thin(&motion.x);
         let repeat = solved.failed || gained || !active_set_unchanged || thinned || !energies.sum().is_finite();
         if !repeat {
-            return (Stepped { solved, estimate, ..Stepped::default() }, Some(energies));
+            return (Stepped { solved, ..Stepped::default() }, errors, Some(energies));
         }
         motion.clone_from(&start);
-        let (again, estimate) = self.euler(motion, times, contacts, solved.failed || gained);
+        let (again, errors) = self.euler(motion, times, contacts, solved.failed || gained);
         let solved = Solved { failed: again.failed, residual: again.residual, ..sum(solved, again) };
         *self.euler_steps_left = if active_set_unchanged { 0 } else { EULER_STEPS_AFTER_CHANGE };
-        (Stepped { solved, estimate, euler: true, ..Stepped::default() }, None)
+        (Stepped { solved, euler: true, ..Stepped::default() }, errors, None)
     }
 
     /// What a step starts from, to repeat it.
     pub(super) fn start(&self, motion: &Kinematics) -> StepStart {
-        (motion.clone(), *self.energy_budget, *self.euler_steps_left)
+        (motion.clone(), *self.energy_budget, *self.euler_steps_left, self.impacts.clone())
     }
 
     /// Goes back to the start of a step.
     pub(super) fn restart(&mut self, start: StepStart, motion: &mut Kinematics) {
-        (*motion, *self.energy_budget, *self.euler_steps_left) = start;
+        (*motion, *self.energy_budget, *self.euler_steps_left, *self.impacts) = start;
         self.refresh_inventory(motion);
     }
 

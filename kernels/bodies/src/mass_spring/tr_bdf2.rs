@@ -59,15 +59,15 @@ impl<'a> Step<'a> {
 }
 
 impl Stepper<'_> {
-    /// Advances `motion` between two `times` with frozen `contacts`; returns the largest estimated error of a particle,
-    /// metres, too. `tolerance`, metres, makes Newton's method converge.
+    /// Advances `motion` between two `times` with frozen `contacts`; returns the estimated errors of positions too.
+    /// `tolerance`, metres, makes Newton's method converge.
     pub(super) fn tr_bdf2(
         &mut self,
         motion: &mut Kinematics,
         times: [f64; 2],
         contacts: &[ContactConstraint],
         tolerance: Option<f64>,
-    ) -> (Solved, f64) {
+    ) -> (Solved, Vec<DVec3>) {
         let body = self.context.body;
         let h = (times[1] - times[0]) * self.seconds;
         let start = motion.clone();
@@ -96,9 +96,8 @@ impl Stepper<'_> {
         } else {
             self.solver.smooth(body, self.cached, &mut error);
         }
-        let estimate = error.iter().map(DVec3::norm_squared).fold(0.0, f64::max).sqrt();
         (motion.x, motion.v) = (end.x, end.v);
-        (solved, estimate)
+        (solved, error)
     }
 
     /// The trapezoidal rule, from the start to γ of the step.

@@ -152,6 +152,11 @@ impl Volumes {
         (self.stored, self.damped) = sums.into_iter().fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1));
     }
 
+    /// Energy that the regions' dashpots take in a step of `h` seconds at the rate last measured, joules.
+    pub(super) fn dissipated(&self, h: f64) -> f64 {
+        if self.a > 0.0 { 2.0 * self.damped * h / self.a } else { 0.0 }
+    }
+
     /// Weight of each region's rank-one term in a stage of `a`, as last measured.
     pub(super) fn weights(&self, a: f64) -> Vec<f64> {
         self.slopes.iter().map(|slope| slope * a * a).collect()

@@ -247,8 +247,8 @@ fn a_corner_snagged_on_a_plate_is_released_when_overstretched() {
     }
 }
 
-/// CG iterations a Newton iteration in a stack of some boxes that come to rest on each other.
-fn stacked(boxes: usize) -> f64 {
+/// Newton and CG iterations of a stack of some boxes that come to rest on each other, without bounces.
+fn stacked(boxes: usize) -> [f64; 2] {
     let (mut points, mut tets, mut surfaces) = (Vec::new(), Vec::new(), Vec::new());
     for k in 0..boxes {
         let (own, of_box, faces) = block([4; 3], 0.05, [0.03 * k as f64, 0.002 + 0.203 * k as f64, 0.02 * k as f64]);
@@ -263,20 +263,24 @@ fn stacked(boxes: usize) -> f64 {
     let ground = Some(Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness: THICKNESS, friction: 0.5 });
     let body_contact = Some(ContactParams { thickness: THICKNESS, friction: 0.5 });
     let scene = CollisionScene { skins: &skins, ground, body_contact, ..CollisionScene::default() };
-    let frame = SolverFrame { contacts: Some(&scene), seconds: FRAME, ..SolverFrame::default() };
+    let frame = SolverFrame { contacts: Some(&scene), seconds: FRAME, bounce: Some(0.0), ..SolverFrame::default() };
     let (mut state, mut solver) = (State::at_rest(&body), BodySolver::new(&body));
     let (mut newton, mut cg) = (0, 0);
     for _ in 0..24 {
         let report = solver.step(&body, &mut state, &frame);
+        assert_eq!(report.caps_hit, 0);
         (newton, cg) = (newton + report.newton, cg + report.cg);
     }
-    f64::from(cg) / f64::from(newton)
+    [newton, cg].map(f64::from)
 }
 
-/// Contacts between bodies are part of the coarse system; without, two boxes take 5.3 times as many.
+/// Contacts between bodies are part of the coarse system; without, two boxes take 5.3 times as many linear iterations for
+/// each of Newton's. Linear solves are accurate enough that Newton's iterations hardly grow with the number of boxes.
 #[test]
-fn a_stack_of_boxes_takes_hardly_more_linear_iterations_than_one() {
-    let one = stacked(1);
-    let [two, three] = [2, 3].map(stacked);
-    assert!(two < 2.5 * one && three < 2.5 * one, "{one}, {two}, {three}");
+fn a_stack_of_boxes_takes_hardly_more_iterations_than_one() {
+    let [one, two, three] = [1, 2, 3].map(stacked);
+    println!("Newton and CG of 1, 2, 3 boxes: {one:?}, {two:?}, {three:?}");
+    for many in [two, three] {
+        assert!(many[1] / many[0] < 4.0 * one[1] / one[0], "{one:?}, {two:?}, {three:?}");
+    }
 }

@@ -6,6 +6,7 @@ use numerics::masked::Masked;
 use numerics::random::Key;
 use numerics::vector::DVec3;
 
+mod bounce;
 mod contact;
 mod exact;
 mod goals;
@@ -23,6 +24,7 @@ const BARE: SolverFrame<'static> = SolverFrame {
     contacts: None,
     integrator: Integrator::Default,
     substeps: 0,
+    bounce: None,
     force_implicit_euler: false,
     cancelled: &|| false,
 };

@@ -1,0 +1,162 @@
+//! Where the energy of a step goes: what damping takes, what drives the body, and what time stepping loses.
+//!
+//! Work is force × displacement with the forces at the end of the step, so that for implicit Euler the balance has no
+//! error of its own.
+
+use super::contact::{ContactConstraint, ContactMode};
+use super::energy::Energies;
+use super::springs;
+use super::stage::Stage;
+use super::step::{Kinematics, Stepper};
+use numerics::vector::DVec3;
+
+impl Stepper<'_> {
+    /// Energy that a step loses without damping, drag or friction, joules: through time stepping, through contacts,
+    /// which should store energy and give it back, and through limits on it. `energies` are those at both ends.
+    pub(super) fn energy_lost(
+        &mut self,
+        [before, after]: [&Energies; 2],
+        start: &Kinematics,
+        motion: &Kinematics,
+        contacts: &[ContactConstraint],
+        times: [f64; 2],
+    ) -> f64 {
+        let h = (times[1] - times[0]) * self.seconds;
+        let (body, external) = (self.context.body, self.context.external);
+        let moved = |particle: usize| motion.x[particle] - start.x[particle];
+        let clusters = &body.order.clusters;
+        let given = clusters.sum((), |cluster, ()| {
+            let of = |particle: usize| {
+                let ends = [times[1], h];
+                external.work(particle, body.mass[particle], ends, motion.x[particle], moved(particle))
+            };
+            clusters.range(cluster).map(of).sum()
+        });
+        let by_contacts = contacts.iter().zip(&self.solver.contact_states).map(|(contact, state)| {
+            if state.mode == ContactMode::Open {
+                return 0.0;
+            }
+            // Of the normal force, only what moves the obstacle.
+            let normal = contact.normal * contact.normal.dot(&state.force);
+            let displacement: DVec3 = contact.sides().map(|(particle, weight)| moved(particle) * weight).sum();
+            (state.force - normal).dot(&displacement) + normal.dot(&contact.velocity) * h
+        });
+        let by_contacts =
+            by_contacts.sum::<f64>() + self.work_of_missing_forces(start, motion, contacts, [times[1], h]);
+        let damped = after.dashed / h + self.solver.volumes.dissipated(h);
+        let pins: Vec<usize> = external.moving_pins().collect();
+        let mut by_pins = 0.0;
+        if !pins.is_empty() {
+            let (y, z) = (&[][..], &[][..]);
+            let stage = Stage {
+                y,
+                z,
+                a: h,
+                time: times[1],
+                contacts,
+                early: 0.0,
+                rotational_energy: &[],
+                line_search: false,
+                index: 0,
+            };
+            let force = self.solver.forces(&self.context, &stage, &motion.x, &motion.v);
+            let reaction = |pin: usize| (motion.v[pin] - start.v[pin]) * (body.mass[pin] / h) - force[pin];
+            by_pins = pins.into_iter().map(|pin| reaction(pin).dot(&moved(pin))).sum();
+        }
+        let lost = before.sum() - after.sum() + given + by_contacts + by_pins - damped;
+        if lost.is_finite() { lost } else { 0.0 }
+    }
+
+    /// Work of moving obstacles by what contact forces at the end of a step of `h` seconds at `time` lack of those that
+    /// changed the momentum of each piece, joules.
+    fn work_of_missing_forces(
+        &self,
+        start: &Kinematics,
+        end: &Kinematics,
+        contacts: &[ContactConstraint],
+        [time, h]: [f64; 2],
+    ) -> f64 {
+        let (body, external, layout) = (self.context.body, self.context.external, &self.solver.layout);
+        // For each piece its missing force, and velocities of obstacles with the sum of their weights.
+        let mut pieces = vec![(DVec3::zeros(), DVec3::zeros(), 0.0); body.order.pieces.len()];
+        for (contact, state) in contacts.iter().zip(&self.solver.contact_states) {
+            if state.mode == ContactMode::Open {
+                continue;
+            }
+            for (particle, weight) in contact.sides() {
+                let (missing, velocity, sum) = &mut pieces[layout.piece_of(particle)];
+                *missing -= state.force * weight;
+                if !contact.is_two_sided() {
+                    *velocity += contact.velocity * (state.normal_force * weight);
+                    *sum += state.normal_force * weight;
+                }
+            }
+        }
+        let mut work = 0.0;
+        for (piece, (mut missing, velocity, sum)) in body.order.pieces.iter().zip(pieces) {
+            let particles = body.particles(piece);
+            if velocity == DVec3::zeros() || external.held[particles.clone()].contains(&true) {
+                continue;
+            }
+            for particle in particles {
+                let mass = body.mass[particle];
+                missing += (end.v[particle] - start.v[particle]) * (mass / h);
+                missing -= external.force(particle, mass, time, end.x[particle], end.v[particle]);
+            }
+            work += missing.dot(&velocity) * (h / sum);
+        }
+        work
+    }
+
+    /// The largest error of the speed of a piece in contact by a step from `start` to `end`, a root mean square over its
+    /// particles, relative to the speed that it would have if all its energy, with what its dashpots took, were kinetic.
+    /// `errors` are those of positions.
+    pub(super) fn impact_error(
+        &self,
+        [start, end]: [&Kinematics; 2],
+        contacts: &[ContactConstraint],
+        errors: &[DVec3],
+        h: f64,
+    ) -> f64 {
+        /// Speeds below this fraction of what gravity gives in a frame are not resolved.
+        const SLOW: f64 = 0.5;
+        let body = self.context.body;
+        let layout = &self.solver.layout;
+        // The squared speed of what each piece touches.
+        let mut touched = vec![-1.0; body.order.pieces.len()];
+        for contact in contacts.iter().filter(|c| c.clearance(&start.x, h).min(c.clearance(&end.x, 0.0)) < 0.0) {
+            for (particle, _) in contact.sides() {
+                let piece = layout.piece_of(particle);
+                touched[piece] = contact.velocity.norm_squared().max(touched[piece]);
+            }
+        }
+        if touched.iter().all(|speed| *speed < 0.0) {
+            return 0.0;
+        }
+        // Of each piece, twice the elastic energy at both ends, and what dashpots take.
+        let mut energy = vec![[0.0; 3]; touched.len()];
+        for (at, [a, _]) in body.ends.iter().enumerate().filter(|(at, _)| self.context.rest.is_intact(*at as u32)) {
+            let [then, now] = [&self.solver.lengths, &self.solver.lengths_now].map(|lengths| lengths[at]);
+            let stored = |length| springs::stored(body, &self.context.rest, at, length);
+            let sums = &mut energy[layout.piece_of(*a as usize)];
+            (sums[0], sums[1]) = (sums[0] + 2.0 * stored(then), sums[1] + 2.0 * stored(now));
+            sums[2] += 2.0 * body.damping[at] * (now - then) * (now - then) / h;
+        }
+        let slow = SLOW * DVec3::from(self.frame.gravity).norm() * self.seconds;
+        let of_piece = |(index, piece): (usize, &std::ops::Range<usize>)| {
+            let [mut before, mut after, damped] = energy[index];
+            let (mut mass, mut wrong) = (0.0, 0.0);
+            for particle in body.particles(piece) {
+                mass += body.mass[particle];
+                before += body.mass[particle] * start.v[particle].norm_squared();
+                after += body.mass[particle] * end.v[particle].norm_squared();
+                wrong += body.mass[particle] * errors[particle].norm_squared();
+            }
+            let scale = (before.max(after) + damped) / mass + touched[index] + slow * slow;
+            let wrong = 4.0 * wrong / (mass * h * h);
+            if wrong > 0.0 { (wrong / scale).sqrt() } else { 0.0 }
+        };
+        let pieces = body.order.pieces.iter().enumerate().filter(|piece| touched[piece.0] >= 0.0);
+        pieces.map(of_piece).fold(0.0, f64::max)
+    }
+}
