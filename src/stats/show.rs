@@ -120,7 +120,8 @@ fn as_stored(attribute: &AttributeStats, number: f64) -> f64 {
 pub(super) fn text(name: &str, file: &GeometryFile, stats: &Stats) -> String {
     let mut text = format!("{name}: {}, {} bytes\n", file.format, file.bytes);
     if let Some((time, times)) = file.time {
-        line(&mut text, "frame", &format!("{time}, of {times} with samples"));
+        let of = if times == 0 { "nothing moves".to_owned() } else { format!("of {times} with samples") };
+        line(&mut text, "frame", &format!("{time}, {of}"));
     }
     for part in &stats.parts {
         part_text(part, &mut text);

@@ -254,8 +254,8 @@ impl UsdStage {
                 other => match other.strip_prefix("primvars:") {
                     Some(rest) if !rest.ends_with(":indices") => {
                         let name = own.unwrap_or_else(|| rest.to_owned());
-                        // What a schema has of its own counts.
-                        if name == "P" || name == "v" && has("velocities") || name == "width" && has("widths") {
+                        if name == "P" && self.varies_over_points(prim, other)? {
+                            // Positions are `points`.
                             continue;
                         }
                         let role = self.role(prim, other, &name)?;
@@ -267,6 +267,12 @@ impl UsdStage {
             found.push(Found { attribute: (*attribute).to_owned(), name, role, is_ours });
         }
         Ok(found)
+    }
+
+    /// Whether a primvar has more than one value for all of the prim.
+    fn varies_over_points(&self, prim: &Prim, primvar: &str) -> Result<bool> {
+        let interpolation = self.metadata(prim, primvar, "interpolation")?;
+        Ok(interpolation.as_ref().and_then(Value::text).is_some_and(|how| how != "constant"))
     }
 
     /// The name of an attribute of convect: it writes what is no identifier, or has another name in USD, as `displayName`.
