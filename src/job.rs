@@ -183,7 +183,7 @@ fn wedges(Setting(key, values): &Setting) -> Result<Wedges, Failure> {
         }
         None => match listed.iter().enumerate().find(|(n, value)| listed[..*n].contains(value)) {
             Some((_, twice)) => {
-                let line = format!("`{twice}` is twice in --wedge, and would be cooked twice into one folder");
+                let line = format!("--wedge has `{twice}` twice, whose tasks would write the same files; remove one");
                 Err(Failure::new(Exit::CommandLine, line))
             }
             None => Ok(Wedges { key: key.clone(), values: listed }),

@@ -2,6 +2,7 @@
 //!
 //! Not on rayon's threads: one that waits for an engine takes up the next trial meanwhile, inside the last.
 
+use std::panic::resume_unwind;
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 
@@ -27,7 +28,7 @@ pub(crate) fn map<I, T: Send>(
     };
     let mut made: Vec<(usize, T)> = thread::scope(|scope| {
         let threads = [(); THREADS].map(|()| scope.spawn(until_done));
-        threads.into_iter().flat_map(|thread| thread.join().expect("work that does not panic")).collect()
+        threads.into_iter().flat_map(|thread| thread.join().unwrap_or_else(|panic| resume_unwind(panic))).collect()
     });
     made.sort_by_key(|(n, _)| *n);
     made.into_iter().map(|(_, made)| made).collect()

@@ -160,7 +160,10 @@ impl Times {
         let text = text.map_err(|error| Failure::file(FileError::new(path, "read", error).to_string()))?;
         let report: Value = serde_json::from_str(&text).unwrap_or_default();
         if report["report"] != json!(1) {
-            return Err(Failure::file(format!("`{}` is no report of convect", path.display())));
+            return Err(Failure::file(format!(
+                "`{}` is not a report; `convect cook GRAPH --report FILE` writes one",
+                path.display()
+            )));
         }
         let time = |id: &str| {
             let node = &report["nodes"][id];
@@ -223,8 +226,9 @@ fn rehearsed(engine: &Engine, graph: &Graph, outputs: &[usize], part: (i64, i64)
 pub(crate) fn machines(text: &str) -> Result<Vec<usize>, Failure> {
     let count = |word: &str| word.trim().parse().ok().filter(|count| (1..=100_000).contains(count));
     let counts: Option<Vec<usize>> = text.split(',').map(count).collect();
-    counts
-        .ok_or_else(|| Failure::new(Exit::CommandLine, format!("`{text}` are no numbers of machines; write 1,10,100")))
+    counts.ok_or_else(|| {
+        Failure::new(Exit::CommandLine, format!("`{text}` is not a list of numbers of machines; write 1,10,100"))
+    })
 }
 
 #[cfg(test)]
