@@ -56,7 +56,7 @@ pub(super) fn of(folder: &Path) -> Result<Vec<PartReport>, Failure> {
             .map_err(|error| Failure::file(format!("`{}` is no report: {error}", path.display())))?;
         match report["report"] == json!(1) {
             true => Ok(PartReport { path, report }),
-            false => Err(Failure::file(format!("`{}` is no report of convect", path.display()))),
+            false => Err(Failure::file(format!("`{}` is not a report; cook its part again", path.display()))),
         }
     };
     let mut reports = paths.into_iter().map(read).collect::<Result<Vec<PartReport>, Failure>>()?;
