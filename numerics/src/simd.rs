@@ -4,7 +4,7 @@
 //! gives the same bits. Limit: architectures other than x86-64 only have the baseline path (NEON on
 //! aarch64).
 
-use std::sync::OnceLock;
+use std::sync::LazyLock;
 use std::{env, error, fmt};
 
 /// The environment variable that forces a path: `baseline`, `avx2` or `widest`.
@@ -73,8 +73,8 @@ impl Path {
     /// The path that kernels run where the caller names none: the environment's, read once; the widest where that names
     /// no path.
     pub fn chosen() -> Self {
-        static CHOSEN: OnceLock<Path> = OnceLock::new();
-        *CHOSEN.get_or_init(|| Self::from_environment().unwrap_or_else(|_| Self::widest()))
+        static CHOSEN: LazyLock<Path> = LazyLock::new(|| Path::from_environment().unwrap_or_else(|_| Path::widest()));
+        *CHOSEN
     }
 
     /// `baseline`, `avx2` or `avx512`.

@@ -15,6 +15,7 @@ struct Converted {
 
 impl ConvertedMasks {
     /// Keeps a mask.
+    #[expect(clippy::disallowed_methods, reason = "only moves what is there")]
     pub(super) fn keep(&self, rows: Vec<f32>) -> &[f32] {
         let mut rows = Some(rows);
         let mut list = self;

@@ -90,6 +90,7 @@ impl<'a> Integral<'a> {
     }
 
     /// ∫ from time 0 to `upto`, in the integrand's unit × seconds.
+    #[expect(clippy::disallowed_methods, reason = "a param is evaluated on the calling thread")]
     fn upto(&self, upto: Frame) -> DVec3 {
         if !self.animated {
             let value = self.constant.get_or_init(|| self.value(upto.number()));

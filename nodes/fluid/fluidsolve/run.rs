@@ -341,6 +341,7 @@ impl Run {
     }
 
     /// The output's volume: the level set without what lies inside colliders, and the velocity.
+    #[expect(clippy::disallowed_methods, reason = "only moves what is there")]
     fn volume(&self, cx: &FrameCx) -> Result<Arc<Volume>> {
         if let Some(volume) = self.volume.get() {
             return Ok(volume.clone());

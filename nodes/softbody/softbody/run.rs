@@ -270,6 +270,7 @@ impl Run {
         self.metrics.set(LET_GO, let_go as f64);
     }
 
+    #[expect(clippy::disallowed_methods, reason = "only moves what is there")]
     fn setup(&self, cx: &Cx) -> Result<Arc<SimulationSetup>> {
         if let Some(setup) = self.setup.get() {
             return Ok(setup.clone());

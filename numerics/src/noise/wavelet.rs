@@ -8,7 +8,7 @@
 
 use super::lattice::Point;
 use crate::random::{Key, mix32};
-use std::sync::OnceLock;
+use std::sync::LazyLock;
 
 /// Cells along a side of the tile: a power of two, so that cells wrap with it.
 pub(super) const TILE: usize = 64;
@@ -50,8 +50,7 @@ pub(super) fn noise(point: Point, salt: u32) -> [f32; 3] {
 /// The coefficients, x fastest: three components and padding, for aligned reads. Computed on first use, on the calling
 /// thread only (a pool's thread that waits here must not be given other work).
 pub(super) fn tile() -> &'static [[f32; 4]] {
-    static MADE: OnceLock<Vec<[f32; 4]>> = OnceLock::new();
-    MADE.get_or_init(|| {
+    static MADE: LazyLock<Vec<[f32; 4]>> = LazyLock::new(|| {
         let mut tile = vec![[0.0; 4]; TILE * TILE * TILE];
         for component in 0..3 {
             for (cell, value) in tile.iter_mut().zip(component_tile(component as u64)) {
@@ -59,7 +58,8 @@ pub(super) fn tile() -> &'static [[f32; 4]] {
             }
         }
         tile
-    })
+    });
+    &MADE
 }
 
 /// Random coefficients less their downsampled and upsampled copy.

@@ -38,7 +38,7 @@ use numerics::vector::{DVec3, to_f32};
 pub use obstacle::{Ground, Obstacle};
 pub use overlap::{Overlap, OverlapPartner, Penetration, Separation};
 pub use pair::ContactParams;
-use std::sync::{Mutex, OnceLock};
+use std::sync::Mutex;
 use surface::Positions;
 use swept::BoxTree;
 use vertex::{ContactRules, MovingSurface};
@@ -293,22 +293,22 @@ fn path_of(poses: &[Positions<'_>], point: u32, path: &mut Vec<DVec3>) {
 impl SkinObstaclePair<'_> {
     /// Particles of the skin against triangles of the obstacle.
     fn particles(&self, tree: &BoxTree<'_>, out: &mut Vec<Contact>) {
-        // A particle may be inside anywhere within the bounds; only closed obstacles have an inside.
-        let (solid, bounds) = (OnceLock::new(), tree.bounds);
-        let has_inside = self.obstacle.surface.closed;
+        let bounds = tree.bounds;
+        // Made before the loop: a thread of the pool that waits for another's tree could wait forever.
+        let solid = self.solid_at_start(&bounds);
         let find_in = |(): &mut (), particles: &[u32], out: &mut Vec<Contact>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
             for particle in particles.iter().filter(|particle| !self.released.has_particle(**particle)) {
                 tree.overlapping(&self.boxes[0][*particle as usize], &mut faces);
                 let own = &self.boxes[0][*particle as usize];
                 let entry = self.entry(*particle);
-                if faces.is_empty() && entry.is_none() && !(has_inside && swept::overlap(own, &bounds)) {
+                if faces.is_empty() && entry.is_none() && !(solid.is_some() && swept::overlap(own, &bounds)) {
                     continue;
                 }
                 path_of(self.body.poses, *particle, &mut path);
                 let start = path[0];
                 hits.clear();
-                let closest_at_start = || self.closest_at_start(&solid, &bounds, start);
+                let closest_at_start = || self.closest_at_start(solid.as_ref()?, &bounds, start);
                 vertex::hits(&path, &self.still, (&faces, entry), &closest_at_start, &self.rules, &mut hits);
                 for hit in &hits {
                     let corners = self.obstacle.surface.triangles[hit.face as usize];
@@ -320,18 +320,26 @@ impl SkinObstaclePair<'_> {
         collect_in_order(&self.skin.touching, &find_in, out);
     }
 
-    /// The closest triangle at the start of the motion, for a particle within the `bounds` of the obstacle; `solid`
-    /// holds its triangles at that time, built on first use.
-    fn closest_at_start(&self, solid: &OnceLock<TriangleTree>, bounds: &Cuboid, start: DVec3) -> Option<ClosestPoint> {
+    /// The obstacle's triangles at the start of the motion, where it has an inside and a particle may be in it: within
+    /// its `bounds`.
+    fn solid_at_start(&self, bounds: &Cuboid) -> Option<TriangleTree> {
+        let may_be_inside = |particle: &u32| {
+            !self.released.has_particle(*particle) && swept::overlap(&self.boxes[0][*particle as usize], bounds)
+        };
+        if !self.obstacle.surface.closed || !self.skin.touching.iter().any(may_be_inside) {
+            return None;
+        }
+        let mut tree = self.obstacle.solid.clone();
+        tree.refit(&obstacle::narrow(self.still.poses[0]));
+        Some(tree)
+    }
+
+    /// The triangle of `solid` closest to the `start` of a motion, for a particle within the `bounds` of the obstacle.
+    fn closest_at_start(&self, solid: &TriangleTree, bounds: &Cuboid, start: DVec3) -> Option<ClosestPoint> {
         let p = to_f32(start);
         if !swept::overlap(&Cuboid { low: p, high: p }, bounds) {
             return None;
         }
-        let solid = solid.get_or_init(|| {
-            let mut tree = self.obstacle.solid.clone();
-            tree.refit(&obstacle::narrow(self.still.poses[0]));
-            tree
-        });
         let face = solid.closest(p, f32::INFINITY)?.triangle;
         Some(ClosestPoint::on(face, start, self.obstacle.surface.corners(&self.still.start(), face)))
     }
