@@ -104,7 +104,8 @@ params! { PARAMS:
     STOKES: Param<Stokes> = Param::choice("stokes", Coupling::Auto, "When pressure and viscosity are solved together. One after the other, thick liquid falls and turns as it should, but \
          sags, buckles and coils at the wrong rate.");
     CFL: Param<f64> = Param::double("cfl", 2.0,
-        "Cells that the fastest liquid moves in a substep, at most. Smaller values are more accurate and take longer.")
+        "Cells that liquid moves in a substep, at most; the fastest ten-thousandth of it up to twice as many. Smaller values are \
+         more accurate and take longer.")
         .above(0.0).soft(0.5, 5.0);
     MAX_SUBSTEPS: Param<i64> = Param::int("max_substeps", 32,
         "Most substeps of a frame. Where `cfl` asks for more, they are longer, and less accurate.").within(1.0, 4096.0).soft(1.0, 64.0);
@@ -248,7 +249,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "FluidSolve",
-    3,
+    4,
     "Simulates a liquid, from water to honey to nearly rigid. It falls, splashes, sloshes, piles up and creeps. `viscosity` has \
      the same effect at any cell size and time step.",
     Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),

@@ -136,6 +136,18 @@ impl Motion {
         self.velocity.faces().iter().map(largest).fold(0.0, |most, u| f64::from(u).max(most))
     }
 
+    /// What no more than one in `rare` components of the velocity exceeds, but at least the largest ÷ `most`, m/s.
+    pub(super) fn usual_speed(&self, rare: usize, most: f64) -> f64 {
+        let (faces, largest) = (self.velocity.faces(), self.largest_speed());
+        let least = (largest / most) as f32;
+        let mut fast: Vec<f32> = faces.iter().flatten().map(|u| u.abs()).filter(|u| *u > least).collect();
+        let exceeding = faces.iter().map(Vec::len).sum::<usize>() / rare;
+        match fast.len().checked_sub(exceeding + 1) {
+            Some(at) => f64::from(*fast.select_nth_unstable_by(at, f32::total_cmp).1),
+            None => largest / most,
+        }
+    }
+
     /// The rows of the velocity and `layers` cells past the liquid.
     pub(super) fn rows_past_liquid(&self, domain: &Domain, layers: i32) -> CellRows {
         let [low, high] = domain.reach(layers + 1);

@@ -22,7 +22,7 @@ mod pieces;
 #[cfg(test)]
 mod tests;
 
-use std::mem::take;
+use std::mem::{replace, take};
 
 use numerics::vector::{Vec3, scale};
 use serde::{Deserialize, Serialize};
@@ -52,6 +52,8 @@ const PASSES: u32 = 8;
 const FIRST_PASSES: u32 = 2;
 /// Share of the volume that may be wrong after them: a twentieth of what a frame is to be kept to.
 const CLOSE: f64 = 5e-5;
+/// Share of the volume up to which moves end that no longer halve what is wrong: pieces of a few cells do not settle.
+const SETTLED: f64 = 1e-3;
 /// Share of a known volume from which on what cells round off is given back: edges, which faces that move make up for; a ball
 /// of three cells radius stays as it is.
 const ROUNDED: f64 = 0.04;
@@ -197,7 +199,7 @@ impl VolumeTargets {
         };
         targets.set(surface, &found, (0..found.phases.count()).map(of_phase).collect());
         for _ in 0..most {
-            if targets.is_close() {
+            if targets.error() <= CLOSE {
                 break;
             }
             targets.correct_within(surface, solid, materials.as_deref_mut(), CAP);
@@ -261,8 +263,10 @@ impl VolumeTargets {
         let before = self.corrected;
         let (mut cap, mut moved) = (0.5 * (most * size).min(OWN_CAP), 0.0);
         let mut responses = vec![1.0; found.all.len()];
+        let mut error = f64::INFINITY;
         for pass in 0..PASSES {
-            if pass >= FIRST_PASSES && self.is_close() {
+            let last = replace(&mut error, self.error());
+            if pass >= FIRST_PASSES && (error <= CLOSE || error <= SETTLED && error > 0.5 * last) {
                 break;
             }
             let ways = self.ways(&found, unit, &responses, cap);
@@ -308,10 +312,12 @@ impl VolumeTargets {
         lacks.iter().any(is_off) && materials.exchange(surface.view(), &piece_of, &mut lacks)
     }
 
-    /// Whether further moves would change little.
-    fn is_close(&self) -> bool {
-        let sum = |of: &dyn Fn(&PieceTarget) -> f64| self.pieces.iter().fold(0.0, |sum, piece| sum + of(piece));
-        sum(&|piece| (piece.measured - piece.volume()).abs()) <= CLOSE * sum(&PieceTarget::volume)
+    /// What all pieces lack or have too much of ÷ what they should enclose; 0 where that is nothing.
+    fn error(&self) -> f64 {
+        let (wrong, target) = self.pieces.iter().fold((0.0, 0.0), |(wrong, target), piece| {
+            (wrong + (piece.measured - piece.volume()).abs(), target + piece.volume())
+        });
+        if wrong > 0.0 { wrong / target } else { 0.0 }
     }
 
     /// Takes out what was added where there is no piece, m³ and its places, for somebody else to carry on.
