@@ -14,6 +14,9 @@ use crate::{FilePosition, FormatError, Result};
 /// Prims of such files are nested no deeper.
 const DEEPEST: usize = 8;
 
+/// The names of prims with geometry in files that convect writes.
+const KINDS: [&str; 4] = ["curves", "mesh", "points", "tets"];
+
 /// A piece of a sequence: its file as the stage names it, and the time from which on it is read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClipPiece {
@@ -36,13 +39,52 @@ struct Declared {
 }
 
 impl UsdStage {
-    /// Reads like [`UsdStage::read`], but leaves positions as they are written: without transforms, unit and axes.
+    /// The prims under the default prim that hold an output each, in order and by the names of their outputs, if that is
+    /// how the file was written; none if it holds a single output, or is by another program.
     ///
     /// # Errors
     /// If the file is damaged.
-    pub fn read_unplaced(&self, time: f64) -> Result<UsdReading> {
+    pub fn members(&self) -> Result<Vec<String>> {
+        let layer = self.root();
+        let text = |prim: u32, field: &str| -> Result<Option<String>> {
+            let value = layer.value_of(prim, field)?;
+            Ok(value.as_ref().and_then(Value::text).map(str::to_owned))
+        };
+        let mut names = Vec::new();
+        for prim in self.member_prims() {
+            let holds_geometry = layer.children(prim).all(|child| KINDS.contains(&layer.name(child)));
+            if text(prim, "typeName")?.as_deref() != Some("Xform")
+                || !holds_geometry
+                || layer.properties(prim).next().is_some()
+            {
+                return Ok(Vec::new());
+            }
+            names.push(text(prim, "displayName")?.unwrap_or_else(|| layer.name(prim).to_owned()));
+        }
+        Ok(names)
+    }
+
+    /// The prims under the default prim, in the root layer.
+    fn member_prims(&self) -> Vec<u32> {
+        let layer = self.root();
+        layer.children(0).next().map_or_else(Vec::new, |prim| layer.children(prim).collect())
+    }
+
+    /// Reads like [`UsdStage::read`], but leaves positions as they are written: without transforms, unit and axes. `member`
+    /// is a position in [`UsdStage::members`]; `None` reads all.
+    ///
+    /// # Errors
+    /// If the file is damaged.
+    pub fn read_member(&self, member: Option<usize>, time: f64) -> Result<UsdReading> {
+        let layer = self.root();
+        let prims = self.member_prims();
+        let path = match (layer.children(0).next(), member.map(|place| prims.get(place))) {
+            (_, None) => String::new(),
+            (Some(top), Some(Some(prim))) => format!("/{}/{}", layer.name(top), layer.name(*prim)),
+            _ => return Err(FormatError::at(FilePosition::File, "it holds fewer outputs than that")),
+        };
         let mut notes = Vec::new();
-        let placed = self.placed_prims("", time, &mut notes)?.into_iter();
+        let placed = self.placed_prims(&path, time, &mut notes)?.into_iter();
         let placed = placed.map(|placed| Placed { matrix: Matrix::IDENTITY, rest: Matrix::IDENTITY, ..placed });
         let mut parts = Vec::new();
         for placed in placed {
