@@ -258,10 +258,10 @@ fn targets(args: &CookArgs, graph: &Graph, request: &Request, format: Format, pi
 }
 
 /// A note for each output that the format could not store completely.
-fn left_out(graph: &Graph, written: &[(usize, Written)], format: Format) -> Vec<Note> {
-    let lossy = written.iter().filter(|(_, written)| !written.lost.is_empty());
-    let note = |(output, written): &(usize, Written)| {
-        let (name, lost) = (&graph.outputs[*output].name, written.lost.join(", "));
+fn left_out(graph: &Graph, written: &[Written], format: Format) -> Vec<Note> {
+    let lossy = written.iter().filter(|written| !written.lost.is_empty());
+    let note = |written: &Written| {
+        let (name, lost) = (written.name(graph), written.lost.join(", "));
         let text = format!("output `{name}` was written without {lost}, which {format} cannot hold; usdc and json can");
         Note::new(kind::NOT_WRITTEN, text)
     };
@@ -269,9 +269,8 @@ fn left_out(graph: &Graph, written: &[(usize, Written)], format: Format) -> Vec<
 }
 
 /// A note for each output whose curves got a width in the file because they have none.
-fn without_width(graph: &Graph, written: &[(usize, Written)], format: Format) -> Vec<Note> {
-    let without = written.iter().filter(|(_, written)| !written.without_width.is_empty());
-    let note = |(output, written): &(usize, Written)| {
+fn without_width(graph: &Graph, written: &[Written], format: Format) -> Vec<Note> {
+    let note = |(output, frames): (&usize, &Vec<Frame>)| {
         let GraphOutput { name, attributes, .. } = &graph.outputs[*output];
         let text = format!("output `{name}`: its curves have no `width`, so {format} got {DEFAULT_WIDTH} m for them");
         let hint = match attributes {
@@ -280,14 +279,14 @@ fn without_width(graph: &Graph, written: &[(usize, Written)], format: Format) ->
             }
             _ => "Set `width` in Curve_Scatter or Curve_In, or make it with Attribute_Expr: `width = 0.002`.",
         };
-        Note::new(kind::NO_WIDTH, text).at(written.without_width.clone()).hint(hint)
+        Note::new(kind::NO_WIDTH, text).at(frames.clone()).hint(hint)
     };
-    without.map(note).collect()
+    written.iter().flat_map(|written| &written.without_width).map(note).collect()
 }
 
 /// Prints what was written, and the speed, to stderr.
-fn print_summary(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf], writing: Duration, verbose: bool) {
-    for (_, written) in written {
+fn print_summary(report: &Report, written: &[Written], drawn: &[PathBuf], writing: Duration, verbose: bool) {
+    for written in written {
         if let (Some(first), Some(last)) = (written.files.first(), written.files.last()) {
             let files = match written.files.len() {
                 1 => first.display().to_string(),
@@ -299,9 +298,9 @@ fn print_summary(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf
         }
     }
     drawn.iter().for_each(|path| crate::say!("wrote {}", path.display()));
-    let frames: BTreeSet<Frame> = written.iter().flat_map(|(_, written)| written.frames.iter().copied()).collect();
+    let frames: BTreeSet<Frame> = written.iter().flat_map(|written| written.frames.iter().copied()).collect();
     if !frames.is_empty() {
-        let wrote_any = !drawn.is_empty() || written.iter().any(|(_, written)| !written.files.is_empty());
+        let wrote_any = !drawn.is_empty() || written.iter().any(|written| !written.files.is_empty());
         crate::say!("{}", times(frames.len(), report.cooking, wrote_any.then_some(writing)));
     }
     if verbose {
@@ -327,7 +326,7 @@ fn times(frames: usize, cooking: Duration, writing: Option<Duration>) -> String 
 }
 
 /// The errors of nodes and the exit code.
-fn outcome(args: &CookArgs, graph: &Graph, report: &Report, written: &[(usize, Written)]) -> Result<(), Failure> {
+fn outcome(args: &CookArgs, graph: &Graph, report: &Report, written: &[Written]) -> Result<(), Failure> {
     let mut lines = Vec::new();
     let mut exit = None;
     let mut reported: Vec<String> = Vec::new();
@@ -352,15 +351,18 @@ fn outcome(args: &CookArgs, graph: &Graph, report: &Report, written: &[(usize, W
         if args.no_write {
             continue;
         }
-        let kept = written.iter().any(|(index, written)| index == output && !written.files.is_empty());
-        let name = &graph.outputs[*output].name;
-        lines.push(match kept {
+        let kept = written.iter().any(|written| written.outputs.contains(output) && !written.files.is_empty());
+        let name = graph.outputs[*output].file();
+        let line = match kept {
             true => format!("output `{name}` lacks the frames that failed"),
             false => format!("output `{name}` was not written"),
-        });
+        };
+        if !lines.contains(&line) {
+            lines.push(line);
+        }
     }
     if report.cancelled {
-        let frames = written.iter().map(|(_, written)| written.frames.len()).max().unwrap_or(0);
+        let frames = written.iter().map(|written| written.frames.len()).max().unwrap_or(0);
         let frames = if frames == 1 { "1 complete frame was".into() } else { format!("{frames} complete frames were") };
         lines.push(match args.no_write {
             true => "interrupted".into(),

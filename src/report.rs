@@ -19,8 +19,8 @@ pub struct Cooked<'a> {
     pub graph: &'a Graph,
     /// Requested frames.
     pub frames: &'a FrameSet,
-    /// What was written, by index of the output.
-    pub written: &'a [(usize, Written)],
+    /// What was written.
+    pub written: &'a [Written],
     /// Number of threads.
     pub threads: usize,
     /// Wall time of writing.
@@ -34,9 +34,10 @@ pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
     let outputs: Map<String, Value> = cooked
         .written
         .iter()
-        .map(|(index, written)| {
-            let output = &cooked.graph.outputs[*index];
-            let errors = report.errors.iter().filter(|(failed, _, _)| failed == index);
+        .map(|written| {
+            let from = |index: &usize| &*cooked.graph.nodes[cooked.graph.outputs[*index].from.node].id;
+            let from: Vec<&str> = written.outputs.iter().map(from).collect();
+            let errors = report.errors.iter().filter(|(failed, _, _)| written.outputs.contains(failed));
             let errors: Vec<Value> = errors
                 .map(|(_, error, frames)| {
                     json!({
@@ -47,17 +48,17 @@ pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
                 .collect();
             let files: Vec<String> = written.files.iter().map(|path| path.display().to_string()).collect();
             let value = json!({
-                "from": *cooked.graph.nodes[output.from.node].id,
+                "from": if let [from] = from[..] { json!(from) } else { json!(from) },
                 "frames": written.frames.len(),
                 "bytes": written.bytes,
                 "files": files,
                 "errors": errors,
             });
-            (output.name.to_string(), value)
+            (written.name(cooked.graph).to_owned(), value)
         })
         .collect();
     // Of an interrupted cook only those that it reached, because a scene may have a billion.
-    let reached = cooked.written.iter().filter_map(|(_, written)| written.frames.last()).max();
+    let reached = cooked.written.iter().filter_map(|written| written.frames.last()).max();
     let was_reached = |frame: &Frame| !report.cancelled || reached.is_some_and(|reached| frame <= reached);
     let frames: Vec<Value> = cooked.frames.iter().take_while(was_reached).map(Frame::to_json).collect();
     let seconds = report.cooking.as_secs_f64();

@@ -5,7 +5,8 @@
     usd_check.py --bpy FILE...               needs bpy: opens each file in Blender
 
 A file NAME.usdc is compared with DIR/NAME.*.json (beside it by default), as `convect cook --format json` writes them;
-there a float may also be a string of its eight hexadecimal digits. What is checked: the file opens; every validator of
+there a float may also be a string of its eight hexadecimal digits, and `outputs` may list the geometries of a stage with
+several outputs, each with its name as `output`. What is checked: the file opens; every validator of
 UsdValidation is silent; stage, prims, types, interpolations and sample times are as the layout says; every value comes
 back bit for bit (from text a NaN only as a NaN); extents are those that USD computes; nothing is printed to stderr.
 Each file is read in a process of its own. Exit code 0 means that all of it holds.
@@ -86,19 +87,57 @@ def open_in_blender(file, folder):
         if frame["frame"] != int(frame["frame"]):
             continue
         bpy.context.scene.frame_set(int(frame["frame"]))
-        for kind in ("curves", "mesh", "points"):
-            thing = bpy.data.objects.get(kind)
-            if thing is None:
-                continue
+        for kind, thing, part in things_of(bpy, frame):
             # An empty component may have no such attribute.
             position = thing.evaluated_get(graph).data.attributes.get("position")
             found = np.zeros(3 * len(position.data) if position else 0, dtype=np.float32)
             if position:
                 position.data.foreach_get("vector", found)
-            expected = array_of(frame.get(kind, {}).get("points", []), "point3f[]")
+            expected = array_of(part.get("points", []), "point3f[]")
             if found.tobytes() != expected.tobytes():
                 faults.append(f"fault: {kind} at {frame['frame']} have {short(found)}, expected {short(expected)}")
     return faults
+
+
+def things_of(bpy, frame):
+    """Kind, Blender's object and component of all that a frame holds."""
+    names = identifiers([one["output"] for one in frame.get("outputs", [])])
+    for name, part in zip(names, frame["outputs"]) if names else [(None, frame)]:
+        for kind in ("curves", "mesh", "points"):
+            if names:
+                # Of equal names all but one get a number. Blender drops what has a single child, so that this is one level
+                # higher.
+                under = bpy.data.objects.get(name)
+                found = [
+                    thing
+                    for thing in bpy.data.objects
+                    if thing.name.split(".")[0] == kind
+                    and thing.parent
+                    and (thing.parent == under if under else thing.parent.name not in names)
+                ]
+                thing = found[0] if found else None
+                if thing is None and kind in part:
+                    print(f"fault: there is no {kind} under {name}")
+            else:
+                thing = bpy.data.objects.get(kind)
+            if thing is not None:
+                yield kind, thing, part.get(kind, {})
+
+
+def identifiers(names):
+    """What names of outputs become: identifiers, those that are some already first, the others with numbers if taken."""
+    def plain(name):
+        return re.sub("^(?=[0-9]|$)", "_", re.sub("[^A-Za-z0-9_]", "_", name))
+
+    taken = {name for name in names if plain(name) == name}
+    found = []
+    for name in names:
+        own, number = plain(name), 2
+        while own != name and own in taken:
+            own, number = f"{plain(name)}_{number}", number + 1
+        taken.add(own)
+        found.append(own)
+    return found
 
 
 def frames_of(file, folder):
@@ -119,7 +158,8 @@ def check_file(file, folder):
         for error in UsdValidation.ValidationContext(validators).Validate(stage)
     ]
     root = stage.GetDefaultPrim()
-    name = re.sub("^(?=[0-9]|$)", "_", re.sub("[^A-Za-z0-9_]", "_", file.stem))
+    (name,) = identifiers([file.stem])
+    outputs = [one["output"] for one in frames[0].get("outputs", [])] if frames else []
     kinds = [kind for kind in KINDS if any(kind in frame for frame in frames)]
     times = [float(frame["frame"]) for frame in frames]
     layer = stage.GetRootLayer()
@@ -131,7 +171,7 @@ def check_file(file, folder):
         "framesPerSecond": (stage.GetFramesPerSecond(), stage.GetTimeCodesPerSecond()),
         "startTimeCode": (layer.startTimeCode if times else 0, times[0] if times else 0),
         "endTimeCode": (layer.endTimeCode if times else 0, times[-1] if times else 0),
-        "prims": ([prim.GetName() for prim in root.GetChildren()], kinds),
+        "prims": ([prim.GetName() for prim in root.GetChildren()], identifiers(outputs) or kinds),
     }
     for frame in frames:
         if frame.get("time") and frame["frame"]:
@@ -139,8 +179,19 @@ def check_file(file, folder):
             facts["timeCodesPerSecond"] = (round(stage.GetTimeCodesPerSecond(), 3), round(fps, 3))
     faults += [f"{fact} is {found}, expected {expected}" for fact, (found, expected) in facts.items() if found != expected]
     lossy_nan = file.suffix == ".usda"
-    for kind in kinds:
-        faults += check_prim(root.GetChild(kind), kind, [frame.get(kind) for frame in frames], times, lossy_nan)
+    for prim, parts in zip(root.GetChildren(), zip(*(frame["outputs"] for frame in frames))) if outputs else [(root, frames)]:
+        kinds = [kind for kind in KINDS if any(kind in part for part in parts)]
+        if outputs:
+            own = parts[0]["output"]
+            for fact, found, wanted in [
+                ("type", prim.GetTypeName(), "Xform"),
+                ("name", prim.GetDisplayName() or prim.GetName(), own),
+                ("prims", [child.GetName() for child in prim.GetChildren()], kinds),
+            ]:
+                if found != wanted:
+                    faults.append(f"{prim.GetPath()}: {fact} is {found}, expected {wanted}")
+        for kind in kinds:
+            faults += check_prim(prim.GetChild(kind), kind, [part.get(kind) for part in parts], times, lossy_nan)
     return faults
 
 

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::layer::{Array, NodeKind, Value};
 use super::matrix::Matrix;
-use super::stage::{FLATTEN, UsdStage, rate, refused};
+use super::stage::{FLATTEN, Prim, UsdStage, rate, refused};
 use super::walk::Placed;
 use super::{UsdReading, join};
 use crate::usd::usda::{decimal, quoted};
@@ -39,50 +39,51 @@ struct Declared {
 }
 
 impl UsdStage {
-    /// The prims under the default prim that hold an output each, in order and by the names of their outputs, if that is
-    /// how the file was written; none if it holds a single output, or is by another program.
+    /// The names of the outputs that the file holds, in order, if convect wrote it with several: each has a prim under the
+    /// default prim. None if it holds a single one, or is by another program.
     ///
     /// # Errors
     /// If the file is damaged.
     pub fn members(&self) -> Result<Vec<String>> {
-        let layer = self.root();
-        let text = |prim: u32, field: &str| -> Result<Option<String>> {
-            let value = layer.value_of(prim, field)?;
-            Ok(value.as_ref().and_then(Value::text).map(str::to_owned))
+        let text = |prim: &Prim, field: &str| -> Result<Option<String>> {
+            Ok(self.field(prim, field)?.as_ref().and_then(Value::text).map(str::to_owned))
         };
         let mut names = Vec::new();
-        for prim in self.member_prims() {
-            let holds_geometry = layer.children(prim).all(|child| KINDS.contains(&layer.name(child)));
-            if text(prim, "typeName")?.as_deref() != Some("Xform")
-                || !holds_geometry
-                || layer.properties(prim).next().is_some()
-            {
+        for prim in self.member_prims()? {
+            let has_own =
+                prim.sites.iter().any(|site| self.layers[site.layer].1.properties(site.node).next().is_some());
+            let holds_else = self.children(&prim)?.iter().any(|child| !KINDS.contains(&last_name(child)));
+            if has_own || holds_else || self.schema(&prim)? != "Xform" {
                 return Ok(Vec::new());
             }
-            names.push(text(prim, "displayName")?.unwrap_or_else(|| layer.name(prim).to_owned()));
+            names.push(text(&prim, "displayName")?.unwrap_or_else(|| last_name(&prim).to_owned()));
         }
         Ok(names)
     }
 
-    /// The prims under the default prim, in the root layer.
-    fn member_prims(&self) -> Vec<u32> {
-        let layer = self.root();
-        layer.children(0).next().map_or_else(Vec::new, |prim| layer.children(prim).collect())
+    /// The prims under the default prim.
+    fn member_prims(&self) -> Result<Vec<Prim>> {
+        let first = self.children(&self.top())?.into_iter().next();
+        first.map_or_else(|| Ok(Vec::new()), |prim| self.children(&prim))
+    }
+
+    /// The path of the prim of an output, by its position in [`UsdStage::members`].
+    ///
+    /// # Errors
+    /// If there is none, or the file is damaged.
+    pub fn member_path(&self, member: usize) -> Result<String> {
+        let prim = self.member_prims()?.into_iter().nth(member);
+        let missing = || FormatError::at(FilePosition::File, format!("it holds at most {member} outputs"));
+        prim.map(|prim| prim.path).ok_or_else(missing)
     }
 
     /// Reads like [`UsdStage::read`], but leaves positions as they are written: without transforms, unit and axes. `member`
     /// is a position in [`UsdStage::members`]; `None` reads all.
     ///
     /// # Errors
-    /// If the file is damaged.
+    /// If there is no such output, or the file is damaged.
     pub fn read_member(&self, member: Option<usize>, time: f64) -> Result<UsdReading> {
-        let layer = self.root();
-        let prims = self.member_prims();
-        let path = match (layer.children(0).next(), member.map(|place| prims.get(place))) {
-            (_, None) => String::new(),
-            (Some(top), Some(Some(prim))) => format!("/{}/{}", layer.name(top), layer.name(*prim)),
-            _ => return Err(FormatError::at(FilePosition::File, "it holds fewer outputs than that")),
-        };
+        let path = member.map_or_else(|| Ok(String::new()), |member| self.member_path(member))?;
         let mut notes = Vec::new();
         let placed = self.placed_prims(&path, time, &mut notes)?.into_iter();
         let placed = placed.map(|placed| Placed { matrix: Matrix::IDENTITY, rest: Matrix::IDENTITY, ..placed });
@@ -228,4 +229,9 @@ impl UsdStage {
         }
         Ok(())
     }
+}
+
+/// The last name of a prim's path.
+fn last_name(prim: &Prim) -> &str {
+    prim.path.rsplit('/').next().unwrap_or_default()
 }
