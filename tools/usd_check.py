@@ -9,14 +9,19 @@ there a float may also be a string of its eight hexadecimal digits, and `outputs
 several outputs, each with its name as `output`. What is checked: the file opens; every validator of
 UsdValidation is silent; stage, prims, types, interpolations and sample times are as the layout says; every value comes
 back bit for bit (from text a NaN only as a NaN); extents are those that USD computes; nothing is printed to stderr.
-Each file is read in a process of its own. Exit code 0 means that all of it holds.
+Files are shared among a few processes; one that ends early is a fault of all files that it had left. Exit code 0 means
+that all of it holds.
 """
 
 import argparse
+import ctypes
 import json
+import os
 import re
 import subprocess
 import sys
+import tempfile
+import traceback
 from pathlib import Path
 
 KINDS = {"curves": "BasisCurves", "mesh": "Mesh", "points": "Points", "tets": "TetMesh"}
@@ -51,27 +56,48 @@ def main():
     parser.add_argument("files", type=Path, nargs="+", metavar="FILE")
     args = parser.parse_args()
     if args.here:
-        check = open_in_blender if args.bpy else check_file
-        faults = check(args.files[0], args.frames or args.files[0].parent)
-        print("\n".join(faults))
-        return bool(faults)
-    return any([report(file, args) for file in args.files])
-
-
-def report(file, args):
-    """Checks one file in a process of its own and prints the verdict; whether it failed."""
-    command = [sys.executable, __file__, "--here", file] + (["--bpy"] if args.bpy else [])
+        return check_here(args)
+    # As many processes as processors: to load a library takes longer than to check most files.
+    count = min(os.cpu_count() or 1, len(args.files))
+    command = [sys.executable, __file__, "--here"] + (["--bpy"] if args.bpy else [])
     command += ["--frames", args.frames] if args.frames else []
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
-    faults = [line for line in done.stdout.splitlines() if line]
-    faults += [f"stderr: {line}" for line in done.stderr.splitlines()]
-    if args.bpy:
-        faults = [line for line in faults if re.search("warn|error|fault:|traceback|cannot", line, re.I)]
-    if done.returncode and not faults:
-        faults = [f"ended with {done.returncode}"]
-    print(f"{file}: {'ok' if not faults else f'{len(faults)} faults'}")
-    print("".join(f"  {fault}\n" for fault in faults[:20]), end="")
-    return bool(faults)
+    shares = [args.files[place::count] for place in range(count)]
+    running = [subprocess.Popen(list(map(str, command + share)), stdout=subprocess.PIPE, text=True) for share in shares]
+    found = {}
+    for process, share in zip(running, shares):
+        lines = process.communicate()[0].splitlines()
+        found |= {file: json.loads(line) for file, line in zip(share, lines)}
+        for file in share[len(lines):]:
+            found[file] = [f"its process ended with {process.returncode}"]
+    for file in args.files:
+        print(f"{file}: {f'{len(found[file])} faults' if found[file] else 'ok'}")
+        print("".join(f"  {fault}\n" for fault in found[file][:20]), end="")
+    return any(found.values())
+
+
+def check_here(args):
+    """Checks files one after another and prints the faults of each as a line of JSON."""
+    own = os.fdopen(os.dup(1), "w")
+    check = open_in_blender if args.bpy else check_file
+    for file in args.files:
+        # Of the libraries' own, too.
+        with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+            os.dup2(out.fileno(), 1)
+            os.dup2(err.fileno(), 2)
+            try:
+                print("\n".join(check(file, args.frames or file.parent)), flush=True)
+            except BaseException:
+                traceback.print_exc()
+            sys.stderr.flush()
+            # What the libraries' own buffers hold.
+            ctypes.CDLL(None).fflush(None)
+            for stream in (out, err):
+                stream.seek(0)
+            said, complaints = (stream.read().decode(errors="replace").splitlines() for stream in (out, err))
+        faults = [line for line in said if line] + [f"stderr: {line}" for line in complaints]
+        if args.bpy:
+            faults = [line for line in faults if re.search("warn|error|fault:|traceback|cannot", line, re.I)]
+        print(json.dumps(faults), file=own, flush=True)
 
 
 def open_in_blender(file, folder):
@@ -197,6 +223,7 @@ def check_file(file, folder):
 
 def check_prim(prim, kind, parts, times, lossy_nan):
     """Every fault of a prim; `parts` are its component in each frame, or None."""
+    import numpy as np
     from pxr import UsdGeom
 
     where = prim.GetPath()
@@ -216,7 +243,7 @@ def check_prim(prim, kind, parts, times, lossy_nan):
             uvw = attributes["primvars:uvw"]
             for time in times or [0]:
                 st, of = attribute.Get(time), uvw.Get(time)
-                if (st is None) != (of is None) or st and [tuple(row)[:2] for row in of] != [tuple(row) for row in st]:
+                if (st is None) != (of is None) or st and not same(st, np.ascontiguousarray(np.array(of)[:, :2]), True):
                     yield f"{where}.primvars:st at {time} is not the first two of uvw"
             if attribute.GetTypeName() != "texCoord2f[]":
                 yield f"{where}.primvars:st is {attribute.GetTypeName()}, expected texCoord2f[]"
