@@ -17,6 +17,7 @@ use engine::time::Frame;
 use formats::Format;
 use formats::atomic::AtomicFile;
 use formats::usd::DEFAULT_WIDTH;
+use serde_json::Value;
 
 use crate::args::{Frames, PartRange, Setting, Size};
 use crate::failure::{Exit, Failure, cancelled_by_signal, exit_of_error};
@@ -24,7 +25,7 @@ use crate::output::{Writers, Written, add_targets, create_folder, failed, fill};
 use crate::pictures::{self, Pictures, Staged};
 use crate::progress::Progress;
 use crate::targets::Targets;
-use crate::{load, memory, report};
+use crate::{load, memory, report, unread};
 
 /// The arguments of `cook`.
 #[derive(Debug, clap::Args)]
@@ -95,7 +96,10 @@ pub fn run(args: &CookArgs) -> Result<(), Failure> {
     let format: Format = args.format.parse().map_err(|error| Failure::new(Exit::CommandLine, format!("{error}")))?;
     let ceiling = memory::ceiling(args.memory);
     let engine = load::engine(usize::from(args.threads), ceiling)?.comparing_samples(args.report.is_some());
-    let graph = load::graph(&args.graph, &args.set)?.map_err(|faults| load::faulty(&args.graph, &faults))?;
+    let bytes = load::bytes(&args.graph)?;
+    let graph = load::loaded(&bytes, &args.graph, &args.set).map_err(|faults| load::faulty(&args.graph, &faults))?;
+    let recipe = report::recipe(&bytes, &args.set);
+    drop(bytes);
     let request = Request {
         outputs: load::outputs(&graph, &args.outputs)?,
         frames: match args.part {
@@ -120,7 +124,7 @@ pub fn run(args: &CookArgs) -> Result<(), Failure> {
     let pictures = pictures.transpose()?;
     // The pictures' guides are cooked along.
     let cooked = staged.as_ref().map_or((&graph, &request), |staged| (&staged.graph, &staged.request));
-    cook(args, &engine, [(&graph, &request), cooked], format, pictures)
+    cook(args, &engine, [(&graph, &request), cooked], format, pictures, recipe)
 }
 
 /// Refuses more frames than memory can keep account of.
@@ -145,6 +149,7 @@ fn cook(
     [(graph, request), cooked]: [(&Graph, &Request); 2],
     format: Format,
     mut pictures: Option<Pictures<'_>>,
+    recipe: Value,
 ) -> Result<(), Failure> {
     // From here on a signal lets the cook end in order, without temporaries.
     let cancel = cancelled_by_signal();
@@ -186,14 +191,18 @@ fn cook(
     drop(progress);
     let mut report = cooked.map_err(|stopped| match stopped {
         Stopped::Asked(error) => Failure::new(exit_of_error(&error), error.to_string()),
-        Stopped::Sink(failure) => failure,
+        Stopped::Sink(mut failure) => {
+            failure.lines.extend(writers.after_failure());
+            failure
+        }
     })?;
     report.errors.retain(|(output, _, _)| *output < graph.outputs.len());
     let watch = Stopwatch::start();
     let incomplete: Vec<usize> = report.errors.iter().map(|(output, _, _)| *output).collect();
-    let written = writers.finish(&incomplete, &varying(args, graph, &report))?;
+    let (written, unwritten) = writers.finish(&incomplete, &varying(args, graph, &report));
     report.notes.extend(left_out(graph, &written, format));
     report.notes.extend(without_width(graph, &written, format));
+    report.notes.extend(unread::notes(graph, &report));
     let drawn = pictures.map_or(Ok(Vec::new()), |pictures| pictures.write(report.cancelled, &cancel));
     // What could not be drawn is said after all else is written.
     let (drawn, undrawn) = drawn.map_or_else(|failure| (Vec::new(), Err(failure)), |drawn| (drawn, Ok(())));
@@ -203,6 +212,7 @@ fn cook(
     if args.report.is_some() {
         let cooked = report::Cooked {
             graph_path: load::graph_name(&args.graph),
+            recipe,
             graph,
             frames: &request.frames,
             written: &written,
@@ -212,7 +222,8 @@ fn cook(
         let text = serde_json::to_string_pretty(&report::to_json(&report, &cooked)).unwrap_or_default();
         let text = format!("{text}\n");
         match report_file {
-            Some(file) => fill(file, text.as_bytes())?,
+            // What was written is said all the same.
+            Some(file) => reported = fill(file, text.as_bytes()),
             None => reported = std::io::stdout().write_all(text.as_bytes()).map_err(Failure::from),
         }
     }
@@ -223,10 +234,32 @@ fn cook(
         }
         print_summary(&report, &written, &drawn, writing, args.verbose);
     }
-    outcome(args, graph, &report, &written)?;
-    reported?;
+    let mut ends = vec![outcome(args, graph, &report, &written), reported];
+    if let Some(mut failure) = unwritten {
+        let lacks_files = |written: &&Written| written.files.is_empty();
+        let of = |written: &Written| format!("output `{}` was not written", written.name(graph));
+        failure.lines.extend(written.iter().filter(lacks_files).map(of));
+        ends.insert(0, Err(failure));
+    }
+    failed_together(ends)?;
     undrawn?;
     load::strict(args.strict, &report.notes)
+}
+
+/// All failures as one, with the lines of each once.
+fn failed_together(ends: Vec<Result<(), Failure>>) -> Result<(), Failure> {
+    let mut all: Option<Failure> = None;
+    for failure in ends.into_iter().filter_map(Result::err) {
+        match &mut all {
+            Some(all) => {
+                all.exit = all.exit.min(failure.exit);
+                let new: Vec<String> = failure.lines.into_iter().filter(|line| !all.lines.contains(line)).collect();
+                all.lines.extend(new);
+            }
+            None => all = Some(failure),
+        }
+    }
+    all.map_or(Ok(()), Err)
 }
 
 /// Whether a report is to be written to stdout.

@@ -54,6 +54,7 @@ struct Piece {
 pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     let cancel = cancelled_by_signal();
     let reports = reports::of(&args.folder.join("parts"))?;
+    reports::are_of_one_recipe(&reports)?;
     let mut outputs: BTreeMap<String, Vec<Piece>> = BTreeMap::new();
     for report in &reports {
         for (name, piece) in report.pieces()? {

@@ -9,6 +9,7 @@ use engine::cook::Delivered;
 use engine::frames::FrameSet;
 use engine::geometry::Geometry;
 use engine::graph::Graph;
+use engine::note::FrameRanges;
 use engine::time::Frame;
 use formats::atomic::{AtomicFile, FileError};
 use formats::usd::{Flavour, UsdError, UsdWriter, lacks_width};
@@ -122,12 +123,18 @@ impl<'g> Writers<'g> {
                 Target::Nothing => {}
                 Target::PerFrame => {
                     let files = parallel::map(&mine, |_, one| write_frame(graph, folder, format, one));
+                    let mut failed = Ok(());
                     for (file, one) in files.into_iter().zip(mine) {
-                        let (path, bytes) = file?;
-                        written.files.push(path);
-                        written.bytes += bytes;
-                        written.frames.push(one.frame);
+                        match file {
+                            Ok((path, bytes)) => {
+                                written.files.push(path);
+                                written.bytes += bytes;
+                                written.frames.push(one.frame);
+                            }
+                            Err(failure) => failed = failed.and(Err(failure)),
+                        }
                     }
+                    failed?;
                 }
             }
         }
@@ -135,12 +142,10 @@ impl<'g> Writers<'g> {
     }
 
     /// Finishes files with all frames, except those of outputs in `incomplete`: a file with missing frames could be
-    /// mistaken for a complete one. Those in `sampled` get time samples of every attribute. Returns what was written.
-    ///
-    /// # Errors
-    /// If a file cannot be finished.
-    pub fn finish(self, incomplete: &[usize], sampled: &[usize]) -> Result<Vec<Written>, Failure> {
-        let mut all = Vec::new();
+    /// mistaken for a complete one. Those in `sampled` get time samples of every attribute. Returns what was written, and
+    /// why other files could not be finished.
+    pub fn finish(self, incomplete: &[usize], sampled: &[usize]) -> (Vec<Written>, Option<Failure>) {
+        let (mut all, mut failed): (Vec<Written>, Option<Failure>) = (Vec::new(), None);
         for (target, mut written) in self.files {
             if let Target::Sequence { writer: Some(mut writer), .. } = target {
                 let are_of = |some: &[usize]| written.outputs.iter().any(|output| some.contains(output));
@@ -150,14 +155,39 @@ impl<'g> Writers<'g> {
                     if are_of(sampled) {
                         writer.sample_all();
                     }
-                    let summary = writer.finish().map_err(usd_failed)?;
-                    written.files.push(sequence_path(&self.folder, written.name(self.graph), self.format));
-                    written.bytes = summary.bytes;
+                    match writer.finish().map_err(usd_failed) {
+                        Ok(summary) => {
+                            written.files.push(sequence_path(&self.folder, written.name(self.graph), self.format));
+                            written.bytes = summary.bytes;
+                        }
+                        Err(failure) => {
+                            written.frames.clear();
+                            written.lost.clear();
+                            written.without_width.clear();
+                            failed.get_or_insert(Failure { lines: Vec::new(), ..failure }).lines.extend(failure.lines);
+                        }
+                    }
                 }
             }
             all.push(written);
         }
-        Ok(all)
+        (all, failed)
+    }
+
+    /// For each file what there is of it after writing has failed, a line each.
+    pub fn after_failure(&self) -> Vec<String> {
+        let line = |(target, written): &(Target, Written)| {
+            let name = written.name(self.graph);
+            match target {
+                Target::Nothing => None,
+                Target::PerFrame if !written.files.is_empty() => {
+                    let s = if written.frames.len() == 1 { "" } else { "s" };
+                    Some(format!("output `{name}` was written at frame{s} {} only", FrameRanges(&written.frames)))
+                }
+                _ => Some(format!("output `{name}` was not written")),
+            }
+        };
+        self.files.iter().filter_map(line).collect()
     }
 }
 

@@ -5,16 +5,20 @@ use std::time::Duration;
 use engine::cook::{NodeReport, Report};
 use engine::frames::FrameSet;
 use engine::graph::Graph;
+use engine::key::ContentKey;
 use engine::note::Note;
 use engine::time::Frame;
 use serde_json::{Map, Value, json};
 
+use crate::args::Setting;
 use crate::output::Written;
 
 /// What a report contains in addition to the engine's measurements.
 pub struct Cooked<'a> {
     /// The graph's path.
     pub graph_path: String,
+    /// What it was cooked by, as [`recipe`] says it.
+    pub recipe: Value,
     /// The graph.
     pub graph: &'a Graph,
     /// Requested frames.
@@ -25,6 +29,13 @@ pub struct Cooked<'a> {
     pub threads: usize,
     /// Wall time of writing.
     pub writing: Duration,
+}
+
+/// What a cook is by: the version of the program, a hash of the bytes of the graph's file, and what `--set` changed, by
+/// key.
+pub fn recipe(graph: &[u8], set: &[Setting]) -> Value {
+    let set: Map<String, Value> = set.iter().map(|Setting(key, value)| (key.clone(), json!(value))).collect();
+    json!({"version": env!("CARGO_PKG_VERSION"), "graph": ContentKey::of(graph).to_string(), "set": set})
 }
 
 /// The report.
@@ -66,6 +77,7 @@ pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
     json!({
         "report": 1,
         "graph": cooked.graph_path,
+        "recipe": cooked.recipe,
         "frames": frames,
         "nodes": nodes,
         "outputs": outputs,

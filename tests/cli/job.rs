@@ -208,6 +208,10 @@ fn a_merge_demands_every_frame_once() {
         "--report",
         "farm/parts/3-4/report.json",
     ]);
+    // A report that does not say what its part was cooked by, as older ones.
+    let mut report = bench.read_json("farm/parts/3-4/report.json");
+    report.as_object_mut().unwrap().remove("recipe").unwrap();
+    bench.write("farm/parts/3-4/report.json", &report.to_string());
     let ran = bench.run(&["merge", "farm"]);
     assert_eq!(ran.code, Some(1));
     assert!(
@@ -344,4 +348,31 @@ fn outputs_in_one_stage_are_cooked_in_parts_and_merged() {
         assert_eq!(text.matches("    def Xform \"").count(), 3, "the prims stay apart");
         assert!(text.contains("displayName = \"fall.surface\""), "{from}");
     }
+}
+
+#[test]
+fn parts_of_other_graphs_or_settings_are_not_merged() {
+    let bench = Bench::with_graph(SCENE);
+    let part = |frames: &str, set: &[&str]| {
+        let (folder, report) = (format!("farm/parts/{frames}"), format!("farm/parts/{frames}/report.json"));
+        let words = ["cook", "g.json", "--part", frames, "--output", "grass", "--out", &folder, "--report", &report];
+        bench.done(&[&words, set].concat());
+    };
+    let merged = || {
+        let ran = bench.run(&["merge", "farm"]);
+        (ran.code, ran.stderr)
+    };
+    let parts = "`farm/parts/1-4/report.json` and `farm/parts/5-9/report.json` were cooked with";
+    part("1-4", &["--set", "wind.waviness=0.5"]);
+    part("5-9", &[]);
+    let settings = "different settings, `--set wind.waviness=0.5` and no `--set wind.waviness`; cook the parts again, all with the same\n";
+    assert_eq!(merged(), (Some(1), format!("{parts} {settings}")));
+    part("5-9", &["--set", "wind.waviness=0.5"]);
+    assert_eq!(merged().0, Some(0));
+    let recipe = &bench.read_json("farm/report.json")["recipe"];
+    assert_eq!(recipe["set"], json!({"wind.waviness": "0.5"}));
+    bench.write("g.json", &SCENE.replace("\"noise\": \"none\"", "\"noise\": \"perlin\""));
+    part("5-9", &["--set", "wind.waviness=0.5"]);
+    let graphs = "different graphs, or one that was changed in between; cook the parts again, all with the same\n";
+    assert_eq!(merged(), (Some(1), format!("{parts} {graphs}")));
 }

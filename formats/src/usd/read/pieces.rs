@@ -85,13 +85,14 @@ impl UsdStage {
     pub fn read_member(&self, member: Option<usize>, time: f64) -> Result<UsdReading> {
         let path = member.map_or_else(|| Ok(String::new()), |member| self.member_path(member))?;
         let mut notes = Vec::new();
-        let placed = self.placed_prims(&path, time, &mut notes)?.into_iter();
-        let placed = placed.map(|placed| Placed { matrix: Matrix::IDENTITY, rest: Matrix::IDENTITY, ..placed });
+        let (placed, hides_some) = self.placed_prims(&path, time, &mut notes)?;
+        let placed =
+            placed.into_iter().map(|placed| Placed { matrix: Matrix::IDENTITY, rest: Matrix::IDENTITY, ..placed });
         let mut parts = Vec::new();
         for placed in placed {
             parts.extend(self.part(&placed, time, &|_| true, &mut notes)?);
         }
-        Ok(UsdReading { geometry: join::joined(parts, &mut notes)?, notes })
+        Ok(UsdReading { geometry: join::joined(parts, &mut notes)?, notes, hides_some })
     }
 
     /// Where the default prim is translated to: the scene's origin in a file that convect wrote.
