@@ -80,7 +80,8 @@ pub fn run(args: &ConvertArgs) -> Result<(), Failure> {
         (None, Some(stage)) => stage.fps()?,
         (None, None) => 24.0,
     };
-    let conversion = Conversion { format, scale: args.scale, fps, cancel, stage, left_out: Mutex::default() };
+    let members = stage.as_ref().filter(|_| format.is_sequence()).map_or_else(|| Ok(Vec::new()), UsdFile::members)?;
+    let conversion = Conversion { format, scale: args.scale, fps, cancel, stage, members, left_out: Mutex::default() };
     let written = match &to {
         Some(to) => conversion.file_per_frame(&files, |frame| to.at(frame), to.stem())?,
         None if format.is_sequence() => conversion.one_file(&files, &args.to, &stem_and_frame(&args.to).0)?,
@@ -158,6 +159,8 @@ struct Conversion {
     cancel: Arc<AtomicBool>,
     /// The USD file that is converted.
     stage: Option<UsdFile>,
+    /// Its outputs, by name and path, if it has several and is converted to USD.
+    members: Vec<(String, String)>,
     /// What of it was left out.
     left_out: Mutex<BTreeSet<String>>,
 }
@@ -166,14 +169,17 @@ impl Conversion {
     /// Writes all frames to one file. Several are read in parallel and written in order.
     fn one_file(&self, files: &[(Frame, PathBuf)], to: &Path, name: &str) -> Result<Written, Failure> {
         let flavour = if self.format == Format::Usda { Flavour::Usda } else { Flavour::Usdc };
-        let mut writer = UsdWriter::create(to, flavour, name, self.fps, [0.0; 3]).map_err(usd_failed)?;
+        let members: Vec<&str> = self.members.iter().map(|(name, _)| &**name).collect();
+        let mut writer =
+            UsdWriter::create_set(to, flavour, (name, &members), self.fps, [0.0; 3]).map_err(usd_failed)?;
         let mut without_width = false;
         for some in files.chunks(rayon::current_num_threads()) {
-            let read = parallel::map(some, |_, (frame, path)| self.read(*frame, path));
-            for (geometry, (frame, _)) in read.into_iter().zip(some) {
-                let geometry = geometry?;
-                without_width |= lacks_width(&geometry);
-                writer.frame(frame.number(), &geometry).map_err(usd_failed)?;
+            let read = parallel::map(some, |_, (frame, path)| self.read_all(*frame, path));
+            for (geometries, (frame, _)) in read.into_iter().zip(some) {
+                let geometries = geometries?;
+                without_width |= geometries.iter().any(lacks_width);
+                let geometries: Vec<&Geometry> = geometries.iter().collect();
+                writer.frames(frame.number(), &geometries).map_err(usd_failed)?;
             }
         }
         let bytes = writer.finish().map_err(usd_failed)?.bytes;
@@ -208,7 +214,7 @@ impl Conversion {
     }
 
     fn one_frame(&self, (frame, from): &(Frame, PathBuf), to: PathBuf) -> Result<Written, Failure> {
-        let geometry = self.read(*frame, from)?;
+        let geometry = self.read(*frame, from, None)?;
         let stamp = FrameStamp { frame: frame.number(), seconds: frame.seconds(self.fps) };
         let mut bytes = Vec::new();
         formats::write(self.format, &geometry, &stamp, &mut bytes).map_err(|error| refused(&to, &error))?;
@@ -217,14 +223,25 @@ impl Conversion {
         Ok(Written { files: vec![to], frames: 1, bytes: bytes.len() as u64, lost, without_width: false })
     }
 
-    /// Reads a file, or a frame of a USD file, and scales it; fails after Ctrl-C.
-    fn read(&self, frame: Frame, path: &Path) -> Result<Geometry, Failure> {
+    /// The geometries of a frame: one, or that of each output of a USD file with several.
+    fn read_all(&self, frame: Frame, path: &Path) -> Result<Vec<Geometry>, Failure> {
+        match &self.members[..] {
+            [] => Ok(vec![self.read(frame, path, None)?]),
+            members => members.iter().map(|(_, prim)| self.read(frame, path, Some(prim))).collect(),
+        }
+    }
+
+    /// Reads a file, or a frame of a USD file or of a prim in it, and scales it; fails after Ctrl-C.
+    fn read(&self, frame: Frame, path: &Path, prim: Option<&str>) -> Result<Geometry, Failure> {
         if self.cancel.load(Ordering::Relaxed) {
             return Err(Failure::new(Exit::Interrupted, "interrupted; the files written so far are complete"));
         }
-        let (mut geometry, notes) = match &self.stage {
-            Some(stage) => stage.read(frame.number()).map(|reading| (reading.geometry, reading.notes))?,
-            None => read(path).map(|file| (file.geometry, file.notes))?,
+        let (mut geometry, notes) = match (&self.stage, prim) {
+            (Some(stage), Some(prim)) => {
+                stage.read_prim(prim, frame.number()).map(|reading| (reading.geometry, reading.notes))?
+            }
+            (Some(stage), None) => stage.read(frame.number()).map(|reading| (reading.geometry, reading.notes))?,
+            (None, _) => read(path).map(|file| (file.geometry, file.notes))?,
         };
         self.left_out.lock().unwrap_or_else(PoisonError::into_inner).extend(notes);
         if let Some(kind) = geometry.kinds().find(|kind| !self.format.holds(*kind)) {

@@ -17,6 +17,7 @@ use engine::time::Frame;
 use formats::Format;
 use formats::atomic::AtomicFile;
 use formats::usd::DEFAULT_WIDTH;
+use serde_json::Value;
 
 use crate::args::{Frames, PartRange, Setting, Size};
 use crate::failure::{Exit, Failure, cancelled_by_signal, exit_of_error};
@@ -24,7 +25,7 @@ use crate::output::{Writers, Written, add_targets, create_folder, failed, fill};
 use crate::pictures::{self, Pictures, Staged};
 use crate::progress::Progress;
 use crate::targets::Targets;
-use crate::{load, memory, report};
+use crate::{load, memory, report, unread};
 
 /// The arguments of `cook`.
 #[derive(Debug, clap::Args)]
@@ -95,7 +96,10 @@ pub fn run(args: &CookArgs) -> Result<(), Failure> {
     let format: Format = args.format.parse().map_err(|error| Failure::new(Exit::CommandLine, format!("{error}")))?;
     let ceiling = memory::ceiling(args.memory);
     let engine = load::engine(usize::from(args.threads), ceiling)?.comparing_samples(args.report.is_some());
-    let graph = load::graph(&args.graph, &args.set)?.map_err(|faults| load::faulty(&args.graph, &faults))?;
+    let bytes = load::bytes(&args.graph)?;
+    let graph = load::loaded(&bytes, &args.graph, &args.set).map_err(|faults| load::faulty(&args.graph, &faults))?;
+    let recipe = report::recipe(&bytes, &args.set);
+    drop(bytes);
     let request = Request {
         outputs: load::outputs(&graph, &args.outputs)?,
         frames: match args.part {
@@ -120,7 +124,7 @@ pub fn run(args: &CookArgs) -> Result<(), Failure> {
     let pictures = pictures.transpose()?;
     // The pictures' guides are cooked along.
     let cooked = staged.as_ref().map_or((&graph, &request), |staged| (&staged.graph, &staged.request));
-    cook(args, &engine, [(&graph, &request), cooked], format, pictures)
+    cook(args, &engine, [(&graph, &request), cooked], format, pictures, recipe)
 }
 
 /// Refuses more frames than memory can keep account of.
@@ -145,6 +149,7 @@ fn cook(
     [(graph, request), cooked]: [(&Graph, &Request); 2],
     format: Format,
     mut pictures: Option<Pictures<'_>>,
+    recipe: Value,
 ) -> Result<(), Failure> {
     // From here on a signal lets the cook end in order, without temporaries.
     let cancel = cancelled_by_signal();
@@ -186,14 +191,18 @@ fn cook(
     drop(progress);
     let mut report = cooked.map_err(|stopped| match stopped {
         Stopped::Asked(error) => Failure::new(exit_of_error(&error), error.to_string()),
-        Stopped::Sink(failure) => failure,
+        Stopped::Sink(mut failure) => {
+            failure.lines.extend(writers.after_failure());
+            failure
+        }
     })?;
     report.errors.retain(|(output, _, _)| *output < graph.outputs.len());
     let watch = Stopwatch::start();
     let incomplete: Vec<usize> = report.errors.iter().map(|(output, _, _)| *output).collect();
-    let written = writers.finish(&incomplete, &varying(args, graph, &report))?;
+    let (written, unwritten) = writers.finish(&incomplete, &varying(args, graph, &report));
     report.notes.extend(left_out(graph, &written, format));
     report.notes.extend(without_width(graph, &written, format));
+    report.notes.extend(unread::notes(graph, &report));
     let drawn = pictures.map_or(Ok(Vec::new()), |pictures| pictures.write(report.cancelled, &cancel));
     // What could not be drawn is said after all else is written.
     let (drawn, undrawn) = drawn.map_or_else(|failure| (Vec::new(), Err(failure)), |drawn| (drawn, Ok(())));
@@ -203,6 +212,7 @@ fn cook(
     if args.report.is_some() {
         let cooked = report::Cooked {
             graph_path: load::graph_name(&args.graph),
+            recipe,
             graph,
             frames: &request.frames,
             written: &written,
@@ -212,7 +222,8 @@ fn cook(
         let text = serde_json::to_string_pretty(&report::to_json(&report, &cooked)).unwrap_or_default();
         let text = format!("{text}\n");
         match report_file {
-            Some(file) => fill(file, text.as_bytes())?,
+            // What was written is said all the same.
+            Some(file) => reported = fill(file, text.as_bytes()),
             None => reported = std::io::stdout().write_all(text.as_bytes()).map_err(Failure::from),
         }
     }
@@ -223,10 +234,32 @@ fn cook(
         }
         print_summary(&report, &written, &drawn, writing, args.verbose);
     }
-    outcome(args, graph, &report, &written)?;
-    reported?;
+    let mut ends = vec![outcome(args, graph, &report, &written), reported];
+    if let Some(mut failure) = unwritten {
+        let lacks_files = |written: &&Written| written.files.is_empty();
+        let of = |written: &Written| format!("output `{}` was not written", written.name(graph));
+        failure.lines.extend(written.iter().filter(lacks_files).map(of));
+        ends.insert(0, Err(failure));
+    }
+    failed_together(ends)?;
     undrawn?;
     load::strict(args.strict, &report.notes)
+}
+
+/// All failures as one, with the lines of each once.
+fn failed_together(ends: Vec<Result<(), Failure>>) -> Result<(), Failure> {
+    let mut all: Option<Failure> = None;
+    for failure in ends.into_iter().filter_map(Result::err) {
+        match &mut all {
+            Some(all) => {
+                all.exit = all.exit.min(failure.exit);
+                let new: Vec<String> = failure.lines.into_iter().filter(|line| !all.lines.contains(line)).collect();
+                all.lines.extend(new);
+            }
+            None => all = Some(failure),
+        }
+    }
+    all.map_or(Ok(()), Err)
 }
 
 /// Whether a report is to be written to stdout.
@@ -258,10 +291,10 @@ fn targets(args: &CookArgs, graph: &Graph, request: &Request, format: Format, pi
 }
 
 /// A note for each output that the format could not store completely.
-fn left_out(graph: &Graph, written: &[(usize, Written)], format: Format) -> Vec<Note> {
-    let lossy = written.iter().filter(|(_, written)| !written.lost.is_empty());
-    let note = |(output, written): &(usize, Written)| {
-        let (name, lost) = (&graph.outputs[*output].name, written.lost.join(", "));
+fn left_out(graph: &Graph, written: &[Written], format: Format) -> Vec<Note> {
+    let lossy = written.iter().filter(|written| !written.lost.is_empty());
+    let note = |written: &Written| {
+        let (name, lost) = (written.name(graph), written.lost.join(", "));
         let text = format!("output `{name}` was written without {lost}, which {format} cannot hold; usdc and json can");
         Note::new(kind::NOT_WRITTEN, text)
     };
@@ -269,9 +302,8 @@ fn left_out(graph: &Graph, written: &[(usize, Written)], format: Format) -> Vec<
 }
 
 /// A note for each output whose curves got a width in the file because they have none.
-fn without_width(graph: &Graph, written: &[(usize, Written)], format: Format) -> Vec<Note> {
-    let without = written.iter().filter(|(_, written)| !written.without_width.is_empty());
-    let note = |(output, written): &(usize, Written)| {
+fn without_width(graph: &Graph, written: &[Written], format: Format) -> Vec<Note> {
+    let note = |(output, frames): (&usize, &Vec<Frame>)| {
         let GraphOutput { name, attributes, .. } = &graph.outputs[*output];
         let text = format!("output `{name}`: its curves have no `width`, so {format} got {DEFAULT_WIDTH} m for them");
         let hint = match attributes {
@@ -280,14 +312,14 @@ fn without_width(graph: &Graph, written: &[(usize, Written)], format: Format) ->
             }
             _ => "Set `width` in Curve_Scatter or Curve_In, or make it with Attribute_Expr: `width = 0.002`.",
         };
-        Note::new(kind::NO_WIDTH, text).at(written.without_width.clone()).hint(hint)
+        Note::new(kind::NO_WIDTH, text).at(frames.clone()).hint(hint)
     };
-    without.map(note).collect()
+    written.iter().flat_map(|written| &written.without_width).map(note).collect()
 }
 
 /// Prints what was written, and the speed, to stderr.
-fn print_summary(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf], writing: Duration, verbose: bool) {
-    for (_, written) in written {
+fn print_summary(report: &Report, written: &[Written], drawn: &[PathBuf], writing: Duration, verbose: bool) {
+    for written in written {
         if let (Some(first), Some(last)) = (written.files.first(), written.files.last()) {
             let files = match written.files.len() {
                 1 => first.display().to_string(),
@@ -299,9 +331,9 @@ fn print_summary(report: &Report, written: &[(usize, Written)], drawn: &[PathBuf
         }
     }
     drawn.iter().for_each(|path| crate::say!("wrote {}", path.display()));
-    let frames: BTreeSet<Frame> = written.iter().flat_map(|(_, written)| written.frames.iter().copied()).collect();
+    let frames: BTreeSet<Frame> = written.iter().flat_map(|written| written.frames.iter().copied()).collect();
     if !frames.is_empty() {
-        let wrote_any = !drawn.is_empty() || written.iter().any(|(_, written)| !written.files.is_empty());
+        let wrote_any = !drawn.is_empty() || written.iter().any(|written| !written.files.is_empty());
         crate::say!("{}", times(frames.len(), report.cooking, wrote_any.then_some(writing)));
     }
     if verbose {
@@ -327,7 +359,7 @@ fn times(frames: usize, cooking: Duration, writing: Option<Duration>) -> String 
 }
 
 /// The errors of nodes and the exit code.
-fn outcome(args: &CookArgs, graph: &Graph, report: &Report, written: &[(usize, Written)]) -> Result<(), Failure> {
+fn outcome(args: &CookArgs, graph: &Graph, report: &Report, written: &[Written]) -> Result<(), Failure> {
     let mut lines = Vec::new();
     let mut exit = None;
     let mut reported: Vec<String> = Vec::new();
@@ -352,15 +384,18 @@ fn outcome(args: &CookArgs, graph: &Graph, report: &Report, written: &[(usize, W
         if args.no_write {
             continue;
         }
-        let kept = written.iter().any(|(index, written)| index == output && !written.files.is_empty());
-        let name = &graph.outputs[*output].name;
-        lines.push(match kept {
+        let kept = written.iter().any(|written| written.outputs.contains(output) && !written.files.is_empty());
+        let name = graph.outputs[*output].file();
+        let line = match kept {
             true => format!("output `{name}` lacks the frames that failed"),
             false => format!("output `{name}` was not written"),
-        });
+        };
+        if !lines.contains(&line) {
+            lines.push(line);
+        }
     }
     if report.cancelled {
-        let frames = written.iter().map(|(_, written)| written.frames.len()).max().unwrap_or(0);
+        let frames = written.iter().map(|written| written.frames.len()).max().unwrap_or(0);
         let frames = if frames == 1 { "1 complete frame was".into() } else { format!("{frames} complete frames were") };
         lines.push(match args.no_write {
             true => "interrupted".into(),

@@ -46,7 +46,7 @@ pub fn read(path: &Path) -> Result<GeometryFile, Failure> {
 pub fn read_usd(path: &Path, prim: &str, time: Option<f64>) -> Result<GeometryFile, Failure> {
     let file = UsdFile::open(path, prim)?;
     let time = time.unwrap_or(file.first());
-    let formats::usd::UsdReading { geometry, notes } = file.read(time)?;
+    let formats::usd::UsdReading { geometry, notes, .. } = file.read(time)?;
     Ok(GeometryFile { format: file.format, bytes: file.bytes, geometry, time: Some((time, file.times.len())), notes })
 }
 

@@ -36,6 +36,7 @@ pub mod schema;
 pub mod stats;
 pub mod study;
 pub mod targets;
+pub mod unread;
 pub mod usd_file;
 
 use engine::graph::Catalogue;

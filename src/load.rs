@@ -14,6 +14,7 @@ use formats::Format;
 use crate::CATALOGUE;
 use crate::args::Setting;
 use crate::failure::{Failure, exit_of_faults};
+use crate::output::by_file;
 
 /// Larger graph files are refused: they are something else, or contain geometry that should be in separate files.
 const LARGEST_GRAPH: u64 = 256 << 20;
@@ -123,6 +124,14 @@ pub fn checked_graph(
 /// Faults of outputs with components that `format` cannot hold.
 pub fn format_faults(graph: &Graph, outputs: &[usize], format: Format) -> Vec<Fault> {
     let mut faults = Vec::new();
+    for outputs in by_file(graph, outputs) {
+        let output = &graph.outputs[outputs[0]];
+        if output.prim().is_some() && !format.is_sequence() {
+            let fact = format!("`{}` is a list of outputs, and {format} files hold one each", output.file());
+            let fault = graph.fault_at(Part::Output(&output.name), "output-format", FaultClass::Graph, fact);
+            faults.push(fault.hint("use --format usdc or usda, or name each output"));
+        }
+    }
     for output in outputs.iter().map(|index| &graph.outputs[*index]) {
         let kinds = graph.carries(output.from);
         if let Some(kind) = kinds.iter().find(|kind| !format.holds(**kind)) {
@@ -189,7 +198,7 @@ pub fn nodes(graph: &Graph, ids: &[String]) -> Result<Vec<usize>, Failure> {
     ids.iter().map(index).collect()
 }
 
-/// The indices of the outputs with these names; all if `names` is empty.
+/// The indices of the outputs in files with these names; all if `names` is empty.
 ///
 /// # Errors
 /// If the graph has no output with one of the names.
@@ -200,14 +209,15 @@ pub fn outputs(graph: &Graph, names: &[String]) -> Result<Vec<usize>, Failure> {
     }
     let mut indices = Vec::new();
     for name in names {
-        let index = graph.outputs.iter().position(|output| *output.name == **name).ok_or_else(|| {
-            let outputs: Vec<String> = graph.outputs.iter().map(|output| format!("`{}`", output.name)).collect();
-            Failure::new(
-                Exit::CommandLine,
-                format!("the graph has no output `{name}`; outputs: {}", outputs.join(", ")),
-            )
-        })?;
-        indices.push(index);
+        let before = indices.len();
+        indices.extend((0..graph.outputs.len()).filter(|index| graph.outputs[*index].file() == name));
+        if indices.len() == before {
+            let all: Vec<usize> = (0..graph.outputs.len()).collect();
+            let file = |outputs: &Vec<usize>| format!("`{}`", graph.outputs[outputs[0]].file());
+            let names: Vec<String> = by_file(graph, &all).iter().map(file).collect();
+            let line = format!("the graph has no output `{name}`; outputs: {}", names.join(", "));
+            return Err(Failure::new(Exit::CommandLine, line));
+        }
     }
     indices.sort_unstable();
     indices.dedup();

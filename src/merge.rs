@@ -9,8 +9,10 @@ mod reports;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use engine::geometry::Geometry;
 use engine::time::Frame;
-use formats::usd::{ClipPiece, Flavour, UsdWriter};
+use formats::FormatError;
+use formats::usd::{ClipPiece, Flavour, UsdReading, UsdWriter};
 
 use crate::args::PartRange;
 use crate::failure::{Exit, Failure, cancelled_by_signal};
@@ -52,6 +54,7 @@ struct Piece {
 pub fn run(args: &MergeArgs) -> Result<(), Failure> {
     let cancel = cancelled_by_signal();
     let reports = reports::of(&args.folder.join("parts"))?;
+    reports::are_of_one_recipe(&reports)?;
     let mut outputs: BTreeMap<String, Vec<Piece>> = BTreeMap::new();
     for report in &reports {
         for (name, piece) in report.pieces()? {
@@ -154,11 +157,19 @@ fn one_file(folder: &Path, name: &str, pieces: &[Piece]) -> Result<PathBuf, Fail
     let path = folder.join(format!("{name}.usdc"));
     let fps = stages[0].fps()?;
     let origin = stages[0].stage().origin().map_err(|error| stages[0].refused(&error))?;
-    let mut writer = UsdWriter::create(&path, Flavour::Usdc, name, fps, origin).map_err(usd_failed)?;
+    let members = stages[0].stage().members().map_err(|error| stages[0].refused(&error))?;
+    let named: Vec<&str> = members.iter().map(|name| &**name).collect();
+    let set = (name, &named[..]);
+    let mut writer = UsdWriter::create_set(&path, Flavour::Usdc, set, fps, origin).map_err(usd_failed)?;
+    let places: Vec<Option<usize>> =
+        if members.is_empty() { vec![None] } else { (0..members.len()).map(Some).collect() };
     for (stage, piece) in stages.iter().zip(pieces) {
         for frame in &piece.frames {
-            let read = stage.stage().read_unplaced(frame.number()).map_err(|error| stage.refused(&error))?;
-            writer.frame(frame.number(), &read.geometry).map_err(usd_failed)?;
+            let read = |place: &Option<usize>| stage.stage().read_member(*place, frame.number());
+            let read = places.iter().map(read).collect::<Result<Vec<UsdReading>, FormatError>>();
+            let read = read.map_err(|error| stage.refused(&error))?;
+            let geometries: Vec<&Geometry> = read.iter().map(|one| &one.geometry).collect();
+            writer.frames(frame.number(), &geometries).map_err(usd_failed)?;
         }
     }
     writer.finish().map_err(usd_failed)?;

@@ -1,12 +1,15 @@
 //! Files of outputs: one USD file with all frames, or one file per frame.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::{Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use engine::cook::Delivered;
 use engine::frames::FrameSet;
+use engine::geometry::Geometry;
 use engine::graph::Graph;
+use engine::note::FrameRanges;
 use engine::time::Frame;
 use formats::atomic::{AtomicFile, FileError};
 use formats::usd::{Flavour, UsdError, UsdWriter, lacks_width};
@@ -16,9 +19,11 @@ use numerics::parallel;
 use crate::failure::{Exit, Failure};
 use crate::targets::Targets;
 
-/// What was written for one output.
+/// What was written for one output, or for several that share a file.
 #[derive(Clone, Debug, Default)]
 pub struct Written {
+    /// The outputs, by index.
+    pub outputs: Vec<usize>,
     /// Files, in the order of frames.
     pub files: Vec<PathBuf>,
     /// Their size in bytes.
@@ -27,8 +32,15 @@ pub struct Written {
     pub frames: Vec<Frame>,
     /// What the format dropped.
     pub lost: Vec<String>,
-    /// Frames whose curves have no widths, so that the file got a width for them.
-    pub without_width: Vec<Frame>,
+    /// By output the frames whose curves have no widths, so that the file got a width for them.
+    pub without_width: BTreeMap<usize, Vec<Frame>>,
+}
+
+impl Written {
+    /// The name of the outputs' file.
+    pub fn name<'g>(&self, graph: &'g Graph) -> &'g str {
+        self.outputs.first().map_or("", |output| graph.outputs[*output].file())
+    }
 }
 
 enum Target {
@@ -45,14 +57,15 @@ pub struct Writers<'g> {
     graph: &'g Graph,
     folder: PathBuf,
     format: Format,
-    outputs: Vec<(usize, Target, Written)>,
+    files: Vec<(Target, Written)>,
 }
 
 impl<'g> Writers<'g> {
     /// Writers that only count the frames of `outputs`.
     pub fn none(graph: &'g Graph, outputs: &[usize], format: Format) -> Self {
-        let outputs = outputs.iter().map(|output| (*output, Target::Nothing, Written::default())).collect();
-        Self { graph, folder: PathBuf::new(), format, outputs }
+        let files = by_file(graph, outputs).into_iter();
+        let files = files.map(|outputs| (Target::Nothing, Written { outputs, ..Written::default() })).collect();
+        Self { graph, folder: PathBuf::new(), format, files }
     }
 
     /// Writers for `outputs` into `folder`, which is created if it is missing.
@@ -66,21 +79,24 @@ impl<'g> Writers<'g> {
             Format::Usda => Target::Sequence { flavour: Flavour::Usda, writer: None },
             Format::Obj | Format::Ply | Format::Json => Target::PerFrame,
         };
-        let outputs = outputs.iter().map(|output| (*output, target(), Written::default())).collect();
-        Ok(Self { graph, folder: folder.to_owned(), format, outputs })
+        let files = by_file(graph, outputs).into_iter();
+        let files = files.map(|outputs| (target(), Written { outputs, ..Written::default() })).collect();
+        Ok(Self { graph, folder: folder.to_owned(), format, files })
     }
 
-    /// Writes finished frames.
+    /// Writes finished frames: of outputs that share a file all at once, in the order of the graph's outputs.
     ///
     /// # Errors
     /// If a file cannot be written.
     pub fn take(&mut self, finished: &[Delivered]) -> Result<(), Failure> {
         let (graph, folder, format) = (self.graph, &self.folder, self.format);
-        for (output, target, written) in &mut self.outputs {
-            let mine: Vec<&Delivered> = finished.iter().filter(|one| one.output == *output).collect();
-            let name = &graph.outputs[*output].name;
+        for (target, written) in &mut self.files {
+            let outputs = &written.outputs;
+            let mine: Vec<&Delivered> = finished.iter().filter(|one| outputs.contains(&one.output)).collect();
+            // A frame that one of the outputs lacks is not written: the file will not be, either.
+            let whole = mine.chunk_by(|a, b| a.frame == b.frame).filter(|frame| frame.len() == outputs.len());
             if let Target::Nothing = target {
-                written.frames.extend(mine.iter().map(|one| one.frame));
+                written.frames.extend(whole.map(|frame| frame[0].frame));
                 continue;
             }
             for lost in mine.iter().flat_map(|one| formats::lost(format, &one.geometry)) {
@@ -90,30 +106,35 @@ impl<'g> Writers<'g> {
             }
             match target {
                 Target::Sequence { flavour, writer } => {
-                    for one in mine {
-                        if lacks_width(&one.geometry) {
-                            written.without_width.push(one.frame);
+                    for frame in whole {
+                        let at = frame[0].frame;
+                        for one in frame.iter().filter(|one| lacks_width(&one.geometry)) {
+                            written.without_width.entry(one.output).or_default().push(at);
                         }
-                        if writer.is_none() {
-                            let path = sequence_path(folder, name, format);
-                            let scene = &graph.scene;
-                            let new = UsdWriter::create(path, *flavour, name, scene.fps, scene.origin);
-                            *writer = Some(Box::new(new.map_err(usd_failed)?));
-                        }
-                        let Some(writer) = writer else { continue };
-                        writer.frame(one.frame.number(), &one.geometry).map_err(usd_failed)?;
-                        written.frames.push(one.frame);
+                        let writer = match writer {
+                            Some(writer) => writer,
+                            None => writer.insert(Box::new(sequence(graph, outputs, *flavour, folder, format)?)),
+                        };
+                        let geometries: Vec<&Geometry> = frame.iter().map(|one| &*one.geometry).collect();
+                        writer.frames(at.number(), &geometries).map_err(usd_failed)?;
+                        written.frames.push(at);
                     }
                 }
                 Target::Nothing => {}
                 Target::PerFrame => {
                     let files = parallel::map(&mine, |_, one| write_frame(graph, folder, format, one));
+                    let mut failed = Ok(());
                     for (file, one) in files.into_iter().zip(mine) {
-                        let (path, bytes) = file?;
-                        written.files.push(path);
-                        written.bytes += bytes;
-                        written.frames.push(one.frame);
+                        match file {
+                            Ok((path, bytes)) => {
+                                written.files.push(path);
+                                written.bytes += bytes;
+                                written.frames.push(one.frame);
+                            }
+                            Err(failure) => failed = failed.and(Err(failure)),
+                        }
                     }
+                    failed?;
                 }
             }
         }
@@ -121,31 +142,73 @@ impl<'g> Writers<'g> {
     }
 
     /// Finishes files with all frames, except those of outputs in `incomplete`: a file with missing frames could be
-    /// mistaken for a complete one. Those in `sampled` get time samples of every attribute. Returns what was written, by
-    /// index of the output.
-    ///
-    /// # Errors
-    /// If a file cannot be finished.
-    pub fn finish(self, incomplete: &[usize], sampled: &[usize]) -> Result<Vec<(usize, Written)>, Failure> {
-        let mut all = Vec::new();
-        for (output, target, mut written) in self.outputs {
+    /// mistaken for a complete one. Those in `sampled` get time samples of every attribute. Returns what was written, and
+    /// why other files could not be finished.
+    pub fn finish(self, incomplete: &[usize], sampled: &[usize]) -> (Vec<Written>, Option<Failure>) {
+        let (mut all, mut failed): (Vec<Written>, Option<Failure>) = (Vec::new(), None);
+        for (target, mut written) in self.files {
             if let Target::Sequence { writer: Some(mut writer), .. } = target {
-                if incomplete.contains(&output) {
+                let are_of = |some: &[usize]| written.outputs.iter().any(|output| some.contains(output));
+                if are_of(incomplete) {
                     written.frames.clear();
                 } else {
-                    if sampled.contains(&output) {
+                    if are_of(sampled) {
                         writer.sample_all();
                     }
-                    let name = &self.graph.outputs[output].name;
-                    let summary = writer.finish().map_err(usd_failed)?;
-                    written.files.push(sequence_path(&self.folder, name, self.format));
-                    written.bytes = summary.bytes;
+                    match writer.finish().map_err(usd_failed) {
+                        Ok(summary) => {
+                            written.files.push(sequence_path(&self.folder, written.name(self.graph), self.format));
+                            written.bytes = summary.bytes;
+                        }
+                        Err(failure) => {
+                            written.frames.clear();
+                            written.lost.clear();
+                            written.without_width.clear();
+                            failed.get_or_insert(Failure { lines: Vec::new(), ..failure }).lines.extend(failure.lines);
+                        }
+                    }
                 }
             }
-            all.push((output, written));
+            all.push(written);
         }
-        Ok(all)
+        (all, failed)
     }
+
+    /// For each file what there is of it after writing has failed, a line each.
+    pub fn after_failure(&self) -> Vec<String> {
+        let line = |(target, written): &(Target, Written)| {
+            let name = written.name(self.graph);
+            match target {
+                Target::Nothing => None,
+                Target::PerFrame if !written.files.is_empty() => {
+                    let s = if written.frames.len() == 1 { "" } else { "s" };
+                    Some(format!("output `{name}` was written at frame{s} {} only", FrameRanges(&written.frames)))
+                }
+                _ => Some(format!("output `{name}` was not written")),
+            }
+        };
+        self.files.iter().filter_map(line).collect()
+    }
+}
+
+/// Outputs, those in one file together.
+pub fn by_file(graph: &Graph, outputs: &[usize]) -> Vec<Vec<usize>> {
+    let file = |output: &usize| graph.outputs[*output].file();
+    outputs.chunk_by(|a, b| file(a) == file(b)).map(<[usize]>::to_vec).collect()
+}
+
+/// Starts the USD file of outputs.
+fn sequence(
+    graph: &Graph,
+    outputs: &[usize],
+    flavour: Flavour,
+    folder: &Path,
+    format: Format,
+) -> Result<UsdWriter, Failure> {
+    let prims: Vec<&str> = outputs.iter().filter_map(|output| graph.outputs[*output].prim()).collect();
+    let name = outputs.first().map_or("", |output| graph.outputs[*output].file());
+    let path = sequence_path(folder, name, format);
+    UsdWriter::create_set(path, flavour, (name, &prims), graph.scene.fps, graph.scene.origin).map_err(usd_failed)
 }
 
 /// Adds the files of `outputs` to what a command writes.
@@ -157,7 +220,7 @@ pub fn add_targets(
     format: Format,
     frames: &FrameSet,
 ) {
-    for name in outputs.iter().map(|output| &graph.outputs[*output].name) {
+    for name in by_file(graph, outputs).iter().map(|outputs| graph.outputs[outputs[0]].file()) {
         match format.is_sequence() {
             true => targets.writes("--out", Exit::File, &sequence_path(folder, name, format)),
             false => targets.writes_frames("--out", folder, name, format.name(), frames),

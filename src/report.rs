@@ -5,26 +5,37 @@ use std::time::Duration;
 use engine::cook::{NodeReport, Report};
 use engine::frames::FrameSet;
 use engine::graph::Graph;
+use engine::key::ContentKey;
 use engine::note::Note;
 use engine::time::Frame;
 use serde_json::{Map, Value, json};
 
+use crate::args::Setting;
 use crate::output::Written;
 
 /// What a report contains in addition to the engine's measurements.
 pub struct Cooked<'a> {
     /// The graph's path.
     pub graph_path: String,
+    /// What it was cooked by, as [`recipe`] says it.
+    pub recipe: Value,
     /// The graph.
     pub graph: &'a Graph,
     /// Requested frames.
     pub frames: &'a FrameSet,
-    /// What was written, by index of the output.
-    pub written: &'a [(usize, Written)],
+    /// What was written.
+    pub written: &'a [Written],
     /// Number of threads.
     pub threads: usize,
     /// Wall time of writing.
     pub writing: Duration,
+}
+
+/// What a cook is by: the version of the program, a hash of the bytes of the graph's file, and what `--set` changed, by
+/// key.
+pub fn recipe(graph: &[u8], set: &[Setting]) -> Value {
+    let set: Map<String, Value> = set.iter().map(|Setting(key, value)| (key.clone(), json!(value))).collect();
+    json!({"version": env!("CARGO_PKG_VERSION"), "graph": ContentKey::of(graph).to_string(), "set": set})
 }
 
 /// The report.
@@ -34,9 +45,10 @@ pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
     let outputs: Map<String, Value> = cooked
         .written
         .iter()
-        .map(|(index, written)| {
-            let output = &cooked.graph.outputs[*index];
-            let errors = report.errors.iter().filter(|(failed, _, _)| failed == index);
+        .map(|written| {
+            let from = |index: &usize| &*cooked.graph.nodes[cooked.graph.outputs[*index].from.node].id;
+            let from: Vec<&str> = written.outputs.iter().map(from).collect();
+            let errors = report.errors.iter().filter(|(failed, _, _)| written.outputs.contains(failed));
             let errors: Vec<Value> = errors
                 .map(|(_, error, frames)| {
                     json!({
@@ -47,17 +59,17 @@ pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
                 .collect();
             let files: Vec<String> = written.files.iter().map(|path| path.display().to_string()).collect();
             let value = json!({
-                "from": *cooked.graph.nodes[output.from.node].id,
+                "from": if let [from] = from[..] { json!(from) } else { json!(from) },
                 "frames": written.frames.len(),
                 "bytes": written.bytes,
                 "files": files,
                 "errors": errors,
             });
-            (output.name.to_string(), value)
+            (written.name(cooked.graph).to_owned(), value)
         })
         .collect();
     // Of an interrupted cook only those that it reached, because a scene may have a billion.
-    let reached = cooked.written.iter().filter_map(|(_, written)| written.frames.last()).max();
+    let reached = cooked.written.iter().filter_map(|written| written.frames.last()).max();
     let was_reached = |frame: &Frame| !report.cancelled || reached.is_some_and(|reached| frame <= reached);
     let frames: Vec<Value> = cooked.frames.iter().take_while(was_reached).map(Frame::to_json).collect();
     let seconds = report.cooking.as_secs_f64();
@@ -65,6 +77,7 @@ pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
     json!({
         "report": 1,
         "graph": cooked.graph_path,
+        "recipe": cooked.recipe,
         "frames": frames,
         "nodes": nodes,
         "outputs": outputs,

@@ -77,7 +77,29 @@ impl UsdFile {
     /// # Errors
     /// If the file is damaged, or composed in a way that is not read.
     pub fn read(&self, time: f64) -> Result<UsdReading, Failure> {
-        self.stage.read(&self.prim, time, &|_| true).map_err(|error| refused(&self.path, &error))
+        self.read_prim(&self.prim, time)
+    }
+
+    /// The outputs that convect wrote into the file as prims of their own: the name and path of each; none where that is
+    /// not how it was written, or only a part of it is read.
+    ///
+    /// # Errors
+    /// If the file is damaged.
+    pub fn members(&self) -> Result<Vec<(String, String)>, Failure> {
+        let stage = &self.stage;
+        let members = || -> Result<Vec<(String, String)>, FormatError> {
+            let names = if self.prim.is_empty() { stage.members()? } else { Vec::new() };
+            names.into_iter().enumerate().map(|(place, name)| Ok((name, stage.member_path(place)?))).collect()
+        };
+        members().map_err(|error| self.refused(&error))
+    }
+
+    /// Like [`UsdFile::read`], of the prim at `path`.
+    ///
+    /// # Errors
+    /// As for [`UsdFile::read`]; or if there is no such prim.
+    pub fn read_prim(&self, path: &str, time: f64) -> Result<UsdReading, Failure> {
+        self.stage.read(path, time, &|_| true).map_err(|error| self.refused(&error))
     }
 
     /// The stage itself.

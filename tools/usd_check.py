@@ -5,17 +5,23 @@
     usd_check.py --bpy FILE...               needs bpy: opens each file in Blender
 
 A file NAME.usdc is compared with DIR/NAME.*.json (beside it by default), as `convect cook --format json` writes them;
-there a float may also be a string of its eight hexadecimal digits. What is checked: the file opens; every validator of
+there a float may also be a string of its eight hexadecimal digits, and `outputs` may list the geometries of a stage with
+several outputs, each with its name as `output`. What is checked: the file opens; every validator of
 UsdValidation is silent; stage, prims, types, interpolations and sample times are as the layout says; every value comes
 back bit for bit (from text a NaN only as a NaN); extents are those that USD computes; nothing is printed to stderr.
-Each file is read in a process of its own. Exit code 0 means that all of it holds.
+Files are shared among a few processes; one that ends early is a fault of all files that it had left. Exit code 0 means
+that all of it holds.
 """
 
 import argparse
+import ctypes
 import json
+import os
 import re
 import subprocess
 import sys
+import tempfile
+import traceback
 from pathlib import Path
 
 KINDS = {"curves": "BasisCurves", "mesh": "Mesh", "points": "Points", "tets": "TetMesh"}
@@ -50,27 +56,48 @@ def main():
     parser.add_argument("files", type=Path, nargs="+", metavar="FILE")
     args = parser.parse_args()
     if args.here:
-        check = open_in_blender if args.bpy else check_file
-        faults = check(args.files[0], args.frames or args.files[0].parent)
-        print("\n".join(faults))
-        return bool(faults)
-    return any([report(file, args) for file in args.files])
-
-
-def report(file, args):
-    """Checks one file in a process of its own and prints the verdict; whether it failed."""
-    command = [sys.executable, __file__, "--here", file] + (["--bpy"] if args.bpy else [])
+        return check_here(args)
+    # As many processes as processors: to load a library takes longer than to check most files.
+    count = min(os.cpu_count() or 1, len(args.files))
+    command = [sys.executable, __file__, "--here"] + (["--bpy"] if args.bpy else [])
     command += ["--frames", args.frames] if args.frames else []
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
-    faults = [line for line in done.stdout.splitlines() if line]
-    faults += [f"stderr: {line}" for line in done.stderr.splitlines()]
-    if args.bpy:
-        faults = [line for line in faults if re.search("warn|error|fault:|traceback|cannot", line, re.I)]
-    if done.returncode and not faults:
-        faults = [f"ended with {done.returncode}"]
-    print(f"{file}: {'ok' if not faults else f'{len(faults)} faults'}")
-    print("".join(f"  {fault}\n" for fault in faults[:20]), end="")
-    return bool(faults)
+    shares = [args.files[place::count] for place in range(count)]
+    running = [subprocess.Popen(list(map(str, command + share)), stdout=subprocess.PIPE, text=True) for share in shares]
+    found = {}
+    for process, share in zip(running, shares):
+        lines = process.communicate()[0].splitlines()
+        found |= {file: json.loads(line) for file, line in zip(share, lines)}
+        for file in share[len(lines):]:
+            found[file] = [f"its process ended with {process.returncode}"]
+    for file in args.files:
+        print(f"{file}: {f'{len(found[file])} faults' if found[file] else 'ok'}")
+        print("".join(f"  {fault}\n" for fault in found[file][:20]), end="")
+    return any(found.values())
+
+
+def check_here(args):
+    """Checks files one after another and prints the faults of each as a line of JSON."""
+    own = os.fdopen(os.dup(1), "w")
+    check = open_in_blender if args.bpy else check_file
+    for file in args.files:
+        # Of the libraries' own, too.
+        with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+            os.dup2(out.fileno(), 1)
+            os.dup2(err.fileno(), 2)
+            try:
+                print("\n".join(check(file, args.frames or file.parent)), flush=True)
+            except BaseException:
+                traceback.print_exc()
+            sys.stderr.flush()
+            # What the libraries' own buffers hold.
+            ctypes.CDLL(None).fflush(None)
+            for stream in (out, err):
+                stream.seek(0)
+            said, complaints = (stream.read().decode(errors="replace").splitlines() for stream in (out, err))
+        faults = [line for line in said if line] + [f"stderr: {line}" for line in complaints]
+        if args.bpy:
+            faults = [line for line in faults if re.search("warn|error|fault:|traceback|cannot", line, re.I)]
+        print(json.dumps(faults), file=own, flush=True)
 
 
 def open_in_blender(file, folder):
@@ -86,19 +113,57 @@ def open_in_blender(file, folder):
         if frame["frame"] != int(frame["frame"]):
             continue
         bpy.context.scene.frame_set(int(frame["frame"]))
-        for kind in ("curves", "mesh", "points"):
-            thing = bpy.data.objects.get(kind)
-            if thing is None:
-                continue
+        for kind, thing, part in things_of(bpy, frame):
             # An empty component may have no such attribute.
             position = thing.evaluated_get(graph).data.attributes.get("position")
             found = np.zeros(3 * len(position.data) if position else 0, dtype=np.float32)
             if position:
                 position.data.foreach_get("vector", found)
-            expected = array_of(frame.get(kind, {}).get("points", []), "point3f[]")
+            expected = array_of(part.get("points", []), "point3f[]")
             if found.tobytes() != expected.tobytes():
                 faults.append(f"fault: {kind} at {frame['frame']} have {short(found)}, expected {short(expected)}")
     return faults
+
+
+def things_of(bpy, frame):
+    """Kind, Blender's object and component of all that a frame holds."""
+    names = identifiers([one["output"] for one in frame.get("outputs", [])])
+    for name, part in zip(names, frame["outputs"]) if names else [(None, frame)]:
+        for kind in ("curves", "mesh", "points"):
+            if names:
+                # Of equal names all but one get a number. Blender drops what has a single child, so that this is one level
+                # higher.
+                under = bpy.data.objects.get(name)
+                found = [
+                    thing
+                    for thing in bpy.data.objects
+                    if thing.name.split(".")[0] == kind
+                    and thing.parent
+                    and (thing.parent == under if under else thing.parent.name not in names)
+                ]
+                thing = found[0] if found else None
+                if thing is None and kind in part:
+                    print(f"fault: there is no {kind} under {name}")
+            else:
+                thing = bpy.data.objects.get(kind)
+            if thing is not None:
+                yield kind, thing, part.get(kind, {})
+
+
+def identifiers(names):
+    """What names of outputs become: identifiers, those that are some already first, the others with numbers if taken."""
+    def plain(name):
+        return re.sub("^(?=[0-9]|$)", "_", re.sub("[^A-Za-z0-9_]", "_", name))
+
+    taken = {name for name in names if plain(name) == name}
+    found = []
+    for name in names:
+        own, number = plain(name), 2
+        while own != name and own in taken:
+            own, number = f"{plain(name)}_{number}", number + 1
+        taken.add(own)
+        found.append(own)
+    return found
 
 
 def frames_of(file, folder):
@@ -119,7 +184,8 @@ def check_file(file, folder):
         for error in UsdValidation.ValidationContext(validators).Validate(stage)
     ]
     root = stage.GetDefaultPrim()
-    name = re.sub("^(?=[0-9]|$)", "_", re.sub("[^A-Za-z0-9_]", "_", file.stem))
+    (name,) = identifiers([file.stem])
+    outputs = [one["output"] for one in frames[0].get("outputs", [])] if frames else []
     kinds = [kind for kind in KINDS if any(kind in frame for frame in frames)]
     times = [float(frame["frame"]) for frame in frames]
     layer = stage.GetRootLayer()
@@ -131,7 +197,7 @@ def check_file(file, folder):
         "framesPerSecond": (stage.GetFramesPerSecond(), stage.GetTimeCodesPerSecond()),
         "startTimeCode": (layer.startTimeCode if times else 0, times[0] if times else 0),
         "endTimeCode": (layer.endTimeCode if times else 0, times[-1] if times else 0),
-        "prims": ([prim.GetName() for prim in root.GetChildren()], kinds),
+        "prims": ([prim.GetName() for prim in root.GetChildren()], identifiers(outputs) or kinds),
     }
     for frame in frames:
         if frame.get("time") and frame["frame"]:
@@ -139,13 +205,25 @@ def check_file(file, folder):
             facts["timeCodesPerSecond"] = (round(stage.GetTimeCodesPerSecond(), 3), round(fps, 3))
     faults += [f"{fact} is {found}, expected {expected}" for fact, (found, expected) in facts.items() if found != expected]
     lossy_nan = file.suffix == ".usda"
-    for kind in kinds:
-        faults += check_prim(root.GetChild(kind), kind, [frame.get(kind) for frame in frames], times, lossy_nan)
+    for prim, parts in zip(root.GetChildren(), zip(*(frame["outputs"] for frame in frames))) if outputs else [(root, frames)]:
+        kinds = [kind for kind in KINDS if any(kind in part for part in parts)]
+        if outputs:
+            own = parts[0]["output"]
+            for fact, found, wanted in [
+                ("type", prim.GetTypeName(), "Xform"),
+                ("name", prim.GetDisplayName() or prim.GetName(), own),
+                ("prims", [child.GetName() for child in prim.GetChildren()], kinds),
+            ]:
+                if found != wanted:
+                    faults.append(f"{prim.GetPath()}: {fact} is {found}, expected {wanted}")
+        for kind in kinds:
+            faults += check_prim(prim.GetChild(kind), kind, [part.get(kind) for part in parts], times, lossy_nan)
     return faults
 
 
 def check_prim(prim, kind, parts, times, lossy_nan):
     """Every fault of a prim; `parts` are its component in each frame, or None."""
+    import numpy as np
     from pxr import UsdGeom
 
     where = prim.GetPath()
@@ -165,7 +243,7 @@ def check_prim(prim, kind, parts, times, lossy_nan):
             uvw = attributes["primvars:uvw"]
             for time in times or [0]:
                 st, of = attribute.Get(time), uvw.Get(time)
-                if (st is None) != (of is None) or st and [tuple(row)[:2] for row in of] != [tuple(row) for row in st]:
+                if (st is None) != (of is None) or st and not same(st, np.ascontiguousarray(np.array(of)[:, :2]), True):
                     yield f"{where}.primvars:st at {time} is not the first two of uvw"
             if attribute.GetTypeName() != "texCoord2f[]":
                 yield f"{where}.primvars:st is {attribute.GetTypeName()}, expected texCoord2f[]"

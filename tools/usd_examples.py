@@ -4,7 +4,8 @@
     usd_examples.py CONVECT [--bpy PYTHON] [--frames 1-2] [--folder DIR]      needs usd-core and numpy; PYTHON has bpy
 
 The check of each file is that of `usd_check.py`, against the json frames of the same cook. Without --bpy files are opened in
-usd-core, with it in Blender (bpy 5.2 from PyPI needs Python 3.13), too. Exit code 0 means that all files are right.
+usd-core, with it in Blender (bpy 5.2 from PyPI needs Python 3.13), too. What cannot be loaded is skipped, and said. Exit code
+0 means that all files are right.
 """
 
 import argparse
@@ -40,18 +41,33 @@ def main():
                     wrong.append(f"{graph.stem}: exit {done.returncode}: {done.stderr[-300:]}")
             files += sorted(out.glob("*.usdc"))
         print(f"{len(files)} files cooked in {time.monotonic() - began:.0f} s", flush=True)
-        for python, words in [(sys.executable, []), (args.bpy, ["--bpy"])]:
-            if python:
+        for python, words, module in [(sys.executable, [], "pxr.UsdValidation"), (args.bpy, ["--bpy"], "bpy")]:
+            where = "Blender" if words else "usd-core"
+            why = unloadable(python, module)
+            if why:
+                print(f"{where}: skipped, {why}", flush=True)
+            else:
                 check = [python, ROOT / "tools" / "usd_check.py", *words, *files]
                 done = subprocess.run(list(map(str, check)), capture_output=True, text=True)
                 said = done.stdout.replace(folder + "/", "")
                 right = sum(line.endswith(": ok") for line in said.splitlines())
                 if done.returncode or right != len(files):
                     wrong.append("".join(line + "\n" for line in said.splitlines() if not line.endswith(": ok")) + done.stderr)
-                where = "Blender" if words else "usd-core"
                 print(f"{where}: {right} of {len(files)} files are right, {time.monotonic() - began:.0f} s", flush=True)
     print("\n".join(wrong))
     return bool(wrong)
+
+
+def unloadable(python, module):
+    """Why a Python cannot load a module; nothing if it can."""
+    if not python:
+        return "no Python is given for it"
+    try:
+        done = subprocess.run([python, "-c", f"import {module}"], capture_output=True, text=True)
+    except OSError as error:
+        return f"{python} cannot be run: {error.strerror}"
+    lines = done.stderr.strip().splitlines() or [f"exit {done.returncode}"]
+    return f"{python} cannot load {module}: {lines[-1]}" if done.returncode else None
 
 
 if __name__ == "__main__":

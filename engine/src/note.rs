@@ -29,6 +29,8 @@ pub mod kind {
     pub const MISREAD_ATTRIBUTE: &str = "misread_attribute";
     /// Data that the file format cannot hold.
     pub const NOT_WRITTEN: &str = "not_written";
+    /// Components of a file that no node reads.
+    pub const UNREAD_COMPONENTS: &str = "unread_components";
     /// Curves without a width, which got one in the file.
     pub const NO_WIDTH: &str = "no_width";
 }

@@ -49,7 +49,35 @@ fn write_samples(folder: &Path) -> Outcome {
     for (name, origin, frames) in samples {
         write(folder, name, origin, &frames)?;
     }
-    write(folder, "no-frames", [0.0; 3], &Vec::new())
+    write(folder, "no-frames", [0.0; 3], &Vec::new())?;
+    write_set(folder)
+}
+
+/// Several outputs in one stage, with names that are not valid in USD.
+fn write_set(folder: &Path) -> Outcome {
+    let members = ["skin.1", "skin_1", "2nd", "none"];
+    let at = |frame: u32| -> Outcome<[Geometry; 4]> {
+        Ok([all(frame)?, mesh(1)?.into(), changing(frame)?, nothing(frame > 2)?])
+    };
+    let frames = (1..=4).map(|frame| Ok((frame.into(), at(frame)?))).collect::<Outcome<Vec<(f64, [Geometry; 4])>>>()?;
+    for (flavour, ending) in [(Flavour::Usda, "usda"), (Flavour::Usdc, "usdc")] {
+        let path = folder.join(format!("a-set.{ending}"));
+        let mut writer = UsdWriter::create_set(path, flavour, ("a-set", &members), FPS, [10.0, 0.0, 0.0])?;
+        for (frame, geometries) in &frames {
+            writer.frames(*frame, &geometries.each_ref())?;
+        }
+        writer.finish()?;
+    }
+    for (index, (frame, geometries)) in frames.iter().enumerate() {
+        let outputs = members.iter().zip(geometries).map(|(name, geometry)| {
+            let mut own = expected(*frame, geometry);
+            own["output"] = json!(name);
+            own
+        });
+        let all = json!({"frame": frame, "time": frame / FPS, "outputs": outputs.collect::<Vec<Value>>()});
+        fs::write(folder.join(format!("a-set.{:04}.json", index + 1)), all.to_string())?;
+    }
+    Ok(())
 }
 
 fn whole(frames: u32, at: impl Fn(u32) -> Outcome<Geometry>) -> Outcome<Frames> {

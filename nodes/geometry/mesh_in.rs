@@ -39,11 +39,12 @@ pub(crate) static NODE: Node = Node::new(
 .outputs(&[&MESH])
 .writes(&[&P])
 .attributes(|_| [AttrNames::These(Vec::new()), AttrNames::All])
+.metrics(&[&source::COMPONENTS])
 .checks(|params| source::file_or_inline(params.get(FILE).as_ref(), params.get(POINTS).is_some()));
 
 fn cook(cx: &Cx) -> Result<Outputs> {
     let mut mesh = match cx.get(FILE) {
-        Some(file) => source::from_file(&file, Kind::Mesh)?,
+        Some(file) => source::from_file(cx, &file, Kind::Mesh)?,
         None => inline(cx)?,
     };
     Inline { points: cx.get(ATTRIBUTES), elements: cx.get(ELEMENT_ATTRIBUTES) }.add_to(&mut mesh)?;

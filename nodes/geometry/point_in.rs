@@ -33,11 +33,12 @@ pub(crate) static NODE: Node = Node::new(
 .outputs(&[&OUT])
 .writes(&[&P])
 .attributes(|_| [AttrNames::These(Vec::new()), AttrNames::All])
+.metrics(&[&source::COMPONENTS])
 .checks(|params| source::file_or_inline(params.get(FILE).as_ref(), params.get(POINTS).is_some()));
 
 fn cook(cx: &Cx) -> Result<Outputs> {
     let mut points = match cx.get(FILE) {
-        Some(file) => source::from_file(&file, Kind::Points)?,
+        Some(file) => source::from_file(cx, &file, Kind::Points)?,
         None => Component::points(cx.get(POINTS).unwrap_or_default().to_vec()),
     };
     Inline { points: cx.get(ATTRIBUTES), elements: Arc::default() }.add_to(&mut points)?;

@@ -38,11 +38,12 @@ pub(crate) static NODE: Node = Node::new(
 .outputs(&[&OUT])
 .writes(&[&P])
 .attributes(|_| [AttrNames::These(Vec::new()), AttrNames::All])
+.metrics(&[&source::COMPONENTS])
 .checks(|params| source::file_or_inline(params.get(FILE).as_ref(), params.get(POINTS).is_some()));
 
 fn cook(cx: &Cx) -> Result<Outputs> {
     let mut tets = match cx.get(FILE) {
-        Some(file) => source::from_file(&file, Kind::Tets)?,
+        Some(file) => source::from_file(cx, &file, Kind::Tets)?,
         None => Component::tets(cx.get(TETS).to_vec(), cx.get(POINTS).unwrap_or_default().to_vec())
             .map_err(|error| source::explained(error, TETS.name()))?,
     };

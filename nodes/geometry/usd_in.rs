@@ -3,6 +3,7 @@
 //! The structure of the file is read once a cook; a frame decodes what it needs. Without several samples in what is read,
 //! the node does not vary with the frame.
 
+use crate::shared::source::COMPONENTS;
 use crate::shared::usd::{UsdSource, refused};
 use engine::files::File;
 use engine::prelude::*;
@@ -28,10 +29,18 @@ const MESH: Output = Output::new("mesh", &[Kind::Mesh], "All meshes as one compo
 const POINTS: Output = Output::new("points", &[Kind::Points], "All points as one component.").may_lack();
 const TETS: Output = Output::new("tets", &[Kind::Tets], "All tets as one component.").may_lack();
 
-metrics! { METRICS:
-    LEFT_OUT = Metric::new("left_out", Unit::None, "Prims and attributes of the file that are not read.")
-        .warn_above(0.0, "The file has prims or attributes that are not read. `convect stats FILE` names them, and why.");
-}
+const LEFT_OUT: Metric = Metric::new("left_out", Unit::None, "Prims and attributes of the file that are not read.")
+    .warn_above(0.0, "The file has prims or attributes that are not read. `convect stats FILE` names them, and why.");
+const HELD: Metric = Metric::new(
+    "held",
+    Unit::Frame,
+    "How far the frame is before the first or after the last sample of the file.",
+)
+.warn_above(
+    0.0,
+    "The file has no samples there, so its first or last pose is held. `convect stats FILE` says how many it has. Set \
+             `frame`, or cook other frames.",
+);
 
 pub(crate) static NODE: Node = Node::new(
     "Usd_In",
@@ -46,7 +55,7 @@ pub(crate) static NODE: Node = Node::new(
 .outputs(&[&CURVES, &MESH, &POINTS, &TETS])
 .writes(&[&P])
 .attributes(|_| [AttrNames::These(Vec::new()), AttrNames::All])
-.metrics(METRICS)
+.metrics(&[&COMPONENTS, &LEFT_OUT, &HELD])
 .changes_topology()
 .checks(|params| match params.get(FILE) {
     Some(_) => Ok(()),
@@ -75,8 +84,9 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let source = UsdSource::of(&file)?;
     let prim = cx.get(PRIM);
     let read = source.stage.read(&prim, cx.get(FRAME), &|name| cx.wants_named(name));
-    let formats::usd::UsdReading { mut geometry, notes } = read.map_err(|error| refused(&file, &error))?;
-    if geometry.kinds().next().is_none() {
+    let formats::usd::UsdReading { mut geometry, notes, hides_some } = read.map_err(|error| refused(&file, &error))?;
+    // What is invisible at times is nothing there.
+    if geometry.kinds().next().is_none() && !hides_some {
         let place = if prim.is_empty() { String::new() } else { format!(" at `{prim}`") };
         let fact = format!("`{}` has no curves, mesh, points or tets{place}", file.path().display());
         return Err(Error::file(match notes.first() {
@@ -84,11 +94,36 @@ fn cook(cx: &Cx) -> Result<Outputs> {
             None => fact,
         }));
     }
+    if let Some((kind, name, row)) = not_finite(&geometry) {
+        let fact = format!(
+            "`{}` has a NaN or infinity: `{name}` of the {kind} in row {row}, counted from 0",
+            file.path().display()
+        );
+        let hint =
+            "`convect stats FILE --frame F` counts them by attribute; mend the file, or name a `prim` without them";
+        return Err(Error::file(fact).hint(hint));
+    }
+    cx.publish(COMPONENTS, geometry.kinds().count() as f64);
     cx.publish(LEFT_OUT, notes.len() as f64);
+    cx.publish(HELD, held(&source, &prim, cx.get(FRAME))?);
     geometry.scale_lengths(cx.get(SCALE));
     let part = |kind: Kind| geometry.part(kind).cloned().map(Geometry::from).unwrap_or_default();
     let [curves, mesh, points, tets] = [Kind::Curves, Kind::Mesh, Kind::Points, Kind::Tets].map(part);
     Ok(CURVES.with(curves).and(MESH, mesh).and(POINTS, points).and(TETS, tets))
+}
+
+/// How far a time is from those that the file has samples at; 0 if nothing moves.
+fn held(source: &UsdSource, prim: &str, time: f64) -> Result<f64> {
+    let span = source.span(prim).map_err(|error| Error::file(error.to_string()))?;
+    Ok(span.map_or(0.0, |[first, last]| (first - time).max(time - last).max(0.0)))
+}
+
+/// The first number that is NaN or infinite: its component, attribute and row.
+fn not_finite(geometry: &Geometry) -> Option<(Kind, Name, usize)> {
+    geometry.parts().find_map(|part| {
+        let mut columns = part.columns();
+        columns.find_map(|(_, name, column)| Some((part.kind(), name.clone(), column.first_not_finite()?)))
+    })
 }
 
 #[cfg(test)]

@@ -5,6 +5,8 @@ use std::collections::BTreeSet;
 use engine::cook::Report;
 use engine::graph::Graph;
 
+use crate::output::by_file;
+
 /// Frames that are planned; whether a node varies is known from them.
 pub(super) const PLANNED: usize = 1000;
 
@@ -68,7 +70,9 @@ impl Cut {
     pub(super) fn of(graph: &Graph, report: &Report, frames: (i64, i64), chunk: Option<i64>) -> Self {
         let mut cut = Self { frames, steps: Vec::new(), notes: Vec::new() };
         let (still, groups) = groups(graph, report);
-        let names = |outputs: &[usize]| outputs.iter().map(|at| graph.outputs[*at].name.to_string()).collect();
+        let names = |outputs: &[usize]| {
+            by_file(graph, outputs).iter().map(|outputs| graph.outputs[outputs[0]].file().to_owned()).collect()
+        };
         let whole = |name: String, outputs: &[usize]| Step {
             name,
             outputs: names(outputs),
@@ -125,22 +129,27 @@ impl Cut {
     }
 }
 
-/// Outputs that do not vary; and the others by the solvers that they depend on.
+/// Outputs that do not vary; and the others by the solvers that they depend on. Those in one file stay together.
 fn groups(graph: &Graph, report: &Report) -> (Vec<usize>, Vec<Group>) {
     let (mut still, mut groups): (Vec<usize>, Vec<Group>) = (Vec::new(), Vec::new());
-    for (index, output) in graph.outputs.iter().enumerate() {
-        if !report.nodes[output.from.node].varies {
-            still.push(index);
+    let all: Vec<usize> = (0..graph.outputs.len()).collect();
+    let is_solver = |node: usize| report.nodes[node].time == "solver";
+    for outputs in by_file(graph, &all) {
+        let from: Vec<usize> = outputs.iter().map(|output| graph.outputs[*output].from.node).collect();
+        if !from.iter().any(|node| report.nodes[*node].varies) {
+            still.extend(outputs);
             continue;
         }
-        let above = ancestors(graph, output.from.node);
-        let is_solver = |node: usize| report.nodes[node].time == "solver";
-        let mut group = Group { outputs: vec![index], ..Group::default() };
-        group.solvers = above.iter().copied().filter(|node| is_solver(*node)).collect();
-        group.goes_on = !group.solvers.is_empty() && !is_solver(output.from.node);
-        for window in above.iter().filter_map(|node| report.nodes[*node].window) {
-            group.window = (group.window.0.max(window.frames), group.window.1.max(window.every));
+        let mut group = Group { outputs, ..Group::default() };
+        for node in &from {
+            let above = ancestors(graph, *node);
+            group.solvers.extend(above.iter().copied().filter(|node| is_solver(*node)));
+            for window in above.iter().filter_map(|node| report.nodes[*node].window) {
+                group.window = (group.window.0.max(window.frames), group.window.1.max(window.every));
+            }
         }
+        let is_cut = |node: &usize| report.nodes[*node].varies && !is_solver(*node);
+        group.goes_on = !group.solvers.is_empty() && from.iter().any(is_cut);
         // Outputs that share a solver are cooked together, so that it runs once.
         let together = |other: &Group| {
             !other.solvers.is_disjoint(&group.solvers) || (other.solvers.is_empty() && group.solvers.is_empty())

@@ -183,8 +183,8 @@ impl Times {
 
     /// Seconds of each task of a step.
     fn tasks(&self, engine: &Engine, graph: &Graph, step: &Step) -> Result<Vec<f64>, Failure> {
-        let index = |name: &String| graph.outputs.iter().position(|output| *output.name == **name);
-        let outputs: Vec<usize> = step.outputs.iter().filter_map(index).collect();
+        let is_of = |output: &usize| step.outputs.iter().any(|name| graph.outputs[*output].file() == *name);
+        let outputs: Vec<usize> = (0..graph.outputs.len()).filter(is_of).collect();
         let from = outputs.iter().flat_map(|output| ancestors(graph, graph.outputs[*output].from.node));
         let plan_of = |part: (i64, i64)| rehearsed(engine, graph, &outputs, part);
         // A task behind a solver reads what comes before it from the cache.

@@ -65,6 +65,46 @@ pub(super) fn of(folder: &Path) -> Result<Vec<PartReport>, Failure> {
     Ok(reports)
 }
 
+/// Refuses parts that were cooked by different graphs, settings or versions of the program. A part that does not say by
+/// what is not compared.
+///
+/// # Errors
+/// If two parts differ.
+pub(super) fn are_of_one_recipe(reports: &[PartReport]) -> Result<(), Failure> {
+    let mut known = reports.iter().filter(|report| report.report["recipe"].is_object());
+    let Some(first) = known.next() else { return Ok(()) };
+    for report in known {
+        let [a, b] = [first, report].map(|report| &report.report["recipe"]);
+        let what = if a["graph"] != b["graph"] {
+            "different graphs, or one that was changed in between".to_owned()
+        } else if a["version"] != b["version"] {
+            let version = |recipe: &Value| recipe["version"].as_str().unwrap_or("unknown").to_owned();
+            format!("different versions of convect, {} and {}", version(a), version(b))
+        } else if let Some(key) = differing_key(&a["set"], &b["set"]) {
+            let value = |recipe: &Value| match &recipe["set"][&key] {
+                Value::String(value) => format!("`--set {key}={value}`"),
+                _ => format!("no `--set {key}`"),
+            };
+            format!("different settings, {} and {}", value(a), value(b))
+        } else {
+            continue;
+        };
+        let line = format!(
+            "`{}` and `{}` were cooked with {what}; cook the parts again, all with the same",
+            first.path.display(),
+            report.path.display()
+        );
+        return Err(Failure::file(line));
+    }
+    Ok(())
+}
+
+/// The first key with different values in two objects.
+fn differing_key(a: &Value, b: &Value) -> Option<String> {
+    let [a, b] = [a.as_object()?, b.as_object()?];
+    a.keys().chain(b.keys()).find(|key| a.get(*key) != b.get(*key)).cloned()
+}
+
 impl PartReport {
     /// The outputs of the part.
     ///

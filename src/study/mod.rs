@@ -246,11 +246,15 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
 /// The index of the output with that name, or of the only one.
 fn output(graph: &Graph, name: Option<&str>) -> Result<usize, Failure> {
     match name {
-        Some(name) => Ok(load::outputs(graph, &[name.to_owned()])?[0]),
+        // Of several in one file each can be named.
+        Some(name) if let Some(place) = graph.outputs.iter().position(|output| *output.name == *name) => Ok(place),
+        Some(name) if let [one] = load::outputs(graph, &[name.to_owned()])?[..] => Ok(one),
         None if graph.outputs.len() == 1 => Ok(0),
-        None => {
-            let names: Vec<String> = graph.outputs.iter().map(|output| format!("`{}`", output.name)).collect();
-            let line = format!("the graph has several outputs; write --output with one of {}", names.join(", "));
+        name => {
+            let all = graph.outputs.iter().filter(|output| name.is_none_or(|name| output.file() == name));
+            let names: Vec<String> = all.map(|output| format!("`{}`", output.name)).collect();
+            let what = name.map_or_else(|| "the graph".to_owned(), |name| format!("`{name}`"));
+            let line = format!("{what} has several outputs; write --output with one of {}", names.join(", "));
             Err(Failure::new(Exit::CommandLine, line))
         }
     }

@@ -273,3 +273,24 @@ fn names_in_a_list_are_checked_against_what_comes_in() {
     let right = Bench::with_graph(&graph.replace("heatt", "heat")).run(&["check", "g.json"]);
     assert_eq!((right.code, right.stderr.as_str()), (Some(0), ""));
 }
+
+#[test]
+fn a_list_of_outputs_needs_usd() {
+    let bench = Bench::with_graph(
+        r#"{"convect": 1, "nodes": {"a": {"type": "Mesh_Primitive"}, "b": {"type": "Mesh_Primitive"}}, "outputs": {
+            "one": "a", "set": ["a", "b"]}}"#,
+    );
+    bench.done(&["check", "g.json", "--format", "usda"]);
+    let line = "g.json:2:25: outputs.set: `set` is a list of outputs, and ply files hold one each; use --format usdc or \
+                usda, or name each output\n";
+    for command in [&["check", "g.json", "--format", "ply"][..], &["cook", "g.json", "--format", "ply"]] {
+        let ran = bench.run(command);
+        assert_eq!((ran.code, ran.stderr.as_str()), (Some(3), line));
+    }
+    bench.done(&["cook", "g.json", "--format", "ply", "--output", "one"]);
+    let ran = bench.run(&["cook", "g.json", "--output", "set/a"]);
+    assert_eq!(ran.stderr, "the graph has no output `set/a`; outputs: `one`, `set`\n");
+    let ran = bench.run(&["cook", "g.json", "--format", "usda", "--output", "set"]);
+    assert!(ran.stderr.starts_with("wrote out/set.usda: 1 frame, "), "{}", ran.stderr);
+    assert!(!bench.path("out/one.usda").exists());
+}

@@ -208,6 +208,10 @@ fn a_merge_demands_every_frame_once() {
         "--report",
         "farm/parts/3-4/report.json",
     ]);
+    // A report that does not say what its part was cooked by, as older ones.
+    let mut report = bench.read_json("farm/parts/3-4/report.json");
+    report.as_object_mut().unwrap().remove("recipe").unwrap();
+    bench.write("farm/parts/3-4/report.json", &report.to_string());
     let ran = bench.run(&["merge", "farm"]);
     assert_eq!(ran.code, Some(1));
     assert!(
@@ -303,4 +307,72 @@ fn the_script_of_slurm_runs_each_task_and_queues_those_worth_a_retry() {
     assert!(chmod.unwrap().success());
     let log = script("./fails");
     assert!(log.contains("scontrol requeue 7_1\nframes 1 ended with 1\nmerge 0 ended with 3\n"), "{log}");
+}
+
+#[test]
+fn outputs_in_one_stage_are_cooked_in_parts_and_merged() {
+    let several = r#""outputs": { "set": ["wind", "blades", { "from": "fall.surface", "attributes": ["P"], "v": true }], "dough": "fall" }"#;
+    let bench = Bench::with_graph(
+        &SCENE.replace(r#""outputs": { "grass": "wind", "still": "blades", "dough": "fall" }"#, several),
+    );
+    let ran = bench.run(&["cook", "g.json", "--out", "whole", "--report", "report.json"]);
+    assert_eq!(ran.code, Some(0), "{}", ran.stderr);
+    assert!(ran.stderr.contains("wrote whole/set.usdc: 9 frames, "), "{}", ran.stderr);
+    let output = &bench.read_json("report.json")["outputs"]["set"];
+    assert_eq!(output["from"], json!(["wind", "blades", "fall"]));
+    assert_eq!((&output["frames"], &output["files"]), (&json!(9), &json!(["whole/set.usdc"])));
+
+    // The set needs the solver, so its parts come behind it; each part has all of its prims.
+    bench.done(&["job", "g.json", "--engine", "list", "--out", "farm", "--chunk", "4"]);
+    let list = fs::read_to_string(bench.path("farm/g.list.txt")).unwrap();
+    let lines: Vec<&str> = list.lines().filter(|line| !line.starts_with('#')).collect();
+    assert_eq!(lines.len(), 5, "{list}");
+    assert!(lines[1].contains("--part 1-4 --output set --output dough --out farm/parts/1-4"), "{list}");
+    lines.iter().for_each(|line| run(&bench, line));
+    let same = |a: &str, b: &str| assert_eq!(bench.done(&["diff", a, b]), "the same\n", "{a} and {b}");
+    same("whole/set.usdc", "farm/set.usda");
+    bench.done(&["merge", "farm", "--one-file"]);
+    same("whole/set.usdc", "farm/set.usdc");
+
+    // Each output is a prim, with what it has alone.
+    let stats = bench.json(&["stats", "farm/set.usdc", "--prim", "/set/fall_surface", "--frame", "9", "--json"]);
+    assert_eq!((&stats["mesh"]["faces"], &stats["curves"]), (&json!(6), &Value::Null));
+    let stats = bench.json(&["stats", "farm/set.usda", "--prim", "/set/wind", "--json"]);
+    assert_eq!((&stats["curves"]["curves"], &stats["frames"]), (&json!(60), &json!(9)));
+    let all = bench.json(&["stats", "whole/set.usdc", "--json"]);
+    assert_eq!((&all["curves"]["curves"], &all["mesh"]["faces"]), (&json!(120), &json!(6)));
+    for from in ["whole/set.usdc", "farm/set.usda"] {
+        bench.done(&["convert", from, "set.usda"]);
+        same("set.usda", "whole/set.usdc");
+        let text = fs::read_to_string(bench.path("set.usda")).unwrap();
+        assert_eq!(text.matches("    def Xform \"").count(), 3, "the prims stay apart");
+        assert!(text.contains("displayName = \"fall.surface\""), "{from}");
+    }
+}
+
+#[test]
+fn parts_of_other_graphs_or_settings_are_not_merged() {
+    let bench = Bench::with_graph(SCENE);
+    let part = |frames: &str, set: &[&str]| {
+        let (folder, report) = (format!("farm/parts/{frames}"), format!("farm/parts/{frames}/report.json"));
+        let words = ["cook", "g.json", "--part", frames, "--output", "grass", "--out", &folder, "--report", &report];
+        bench.done(&[&words, set].concat());
+    };
+    let merged = || {
+        let ran = bench.run(&["merge", "farm"]);
+        (ran.code, ran.stderr)
+    };
+    let parts = "`farm/parts/1-4/report.json` and `farm/parts/5-9/report.json` were cooked with";
+    part("1-4", &["--set", "wind.waviness=0.5"]);
+    part("5-9", &[]);
+    let settings = "different settings, `--set wind.waviness=0.5` and no `--set wind.waviness`; cook the parts again, all with the same\n";
+    assert_eq!(merged(), (Some(1), format!("{parts} {settings}")));
+    part("5-9", &["--set", "wind.waviness=0.5"]);
+    assert_eq!(merged().0, Some(0));
+    let recipe = &bench.read_json("farm/report.json")["recipe"];
+    assert_eq!(recipe["set"], json!({"wind.waviness": "0.5"}));
+    bench.write("g.json", &SCENE.replace("\"noise\": \"none\"", "\"noise\": \"perlin\""));
+    part("5-9", &["--set", "wind.waviness=0.5"]);
+    let graphs = "different graphs, or one that was changed in between; cook the parts again, all with the same\n";
+    assert_eq!(merged(), (Some(1), format!("{parts} {graphs}")));
 }

@@ -413,3 +413,37 @@ fn a_limit_on_the_size_of_files_is_an_error_without_temporaries() {
         );
     }
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn after_a_failure_of_a_file_it_is_said_which_outputs_were_written() {
+    let graph = r#"{"convect": 1, "scene": {"frames": [1, 3]}, "nodes": {
+        "small": {"type": "Mesh_Primitive", "params": {"shape": "box", "divisions": 1}},
+        "large": {"type": "Mesh_Primitive", "params": {"shape": "sphere", "divisions": 64}}
+    }, "outputs": {"large": "large", "small": "small"}}"#;
+    // The first is larger than a file may be.
+    for (format, of_large) in [("usda", "was not written"), ("json", "was not written")] {
+        let bench = Bench::with_graph(graph);
+        let script = format!("ulimit -f 60 && exec \"$0\" cook g.json --report r.json --format {format}");
+        let mut command = Command::new("sh");
+        command.args(["-c", &script, env!("CARGO_BIN_EXE_convect")]).current_dir(bench.path(""));
+        let ran = Ran::of(&command.output().unwrap());
+        assert_eq!(ran.code, Some(1), "{format}: {}", ran.stderr);
+        assert!(ran.stderr.contains(&format!("output `large` {of_large}\n")), "{format}: {}", ran.stderr);
+        let is_there = bench.names("out").iter().any(|name| name.starts_with("small"));
+        let is_said = !ran.stderr.contains("output `small` was not written");
+        assert_eq!(is_there, is_said, "{format}: {}", ran.stderr);
+    }
+    // The report is larger; outputs are written, and said.
+    let bench = Bench::with_graph(&graph.replace(r#""large": "large", "#, ""));
+    let name = "x".repeat(120);
+    let inner = format!(
+        "mkdir -p out; ulimit -f 1 && exec \"$0\" cook g.json --set small.size=[1,1,1] --report {name} --no-write"
+    );
+    let mut command = Command::new("sh");
+    command.args(["-c", &inner, env!("CARGO_BIN_EXE_convect")]).current_dir(bench.path(""));
+    let ran = Ran::of(&command.output().unwrap());
+    assert_eq!(ran.code, Some(1), "{}", ran.stderr);
+    assert!(ran.stderr.contains("cooked 3 frames in "), "what was done is said: {}", ran.stderr);
+    assert!(ran.stderr.contains(&format!("`{name}` could not be written: ")), "{}", ran.stderr);
+}

@@ -199,6 +199,8 @@ pub mod code {
         BYPASS = "bypass";
         /// A graph without outputs.
         NO_OUTPUTS = "no-outputs";
+        /// An output that its file would hold twice.
+        DOUBLED_OUTPUT = "doubled-output";
         /// A file that does not exist.
         FILE_MISSING = "file-missing";
         /// A file that cannot be read.

@@ -110,7 +110,8 @@ pub struct GraphNode {
 /// An output to write.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GraphOutput {
-    /// Its name, which is also the name of its file.
+    /// Its name, which is also the name of its file; `FILE/PRIM` where the file, a USD stage, has a prim for each of
+    /// several outputs. These follow each other.
     pub name: Name,
     /// The node output that is written.
     pub from: Link,
@@ -118,6 +119,18 @@ pub struct GraphOutput {
     pub attributes: Option<Vec<Name>>,
     /// Whether to write velocities.
     pub v: bool,
+}
+
+impl GraphOutput {
+    /// The name of its file.
+    pub fn file(&self) -> &str {
+        self.name.split_once('/').map_or(&self.name, |(file, _)| file)
+    }
+
+    /// The name of its prim, if it shares its file with other outputs.
+    pub fn prim(&self) -> Option<&str> {
+        self.name.split_once('/').map(|(_, prim)| prim)
+    }
 }
 
 /// A checked graph: ids and names are unique, wires connect compatible ports without a cycle, params are in range.

@@ -14,7 +14,7 @@ pub enum Part<'a> {
     Param(&'a str, &'a str),
     /// A node's input.
     Input(&'a str, &'a str),
-    /// The output with that name.
+    /// The output with that name; of several in one file, their list.
     Output(&'a str),
 }
 
@@ -25,7 +25,7 @@ impl Part<'_> {
             Self::Node(id) => of("nodes", id),
             Self::Param(id, name) => of(&(of("nodes", id) + ".params"), name),
             Self::Input(id, name) => of(&(of("nodes", id) + ".inputs"), name),
-            Self::Output(name) => of("outputs", name),
+            Self::Output(name) => of("outputs", name.split_once('/').map_or(name, |(file, _)| file)),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! USD files without Pixar's library: `.usda` (text) and `.usdc` (crate 0.8.0) written, and read by [`UsdStage`].
 //!
-//! A [`UsdWriter`] is given one geometry per frame and keeps only the last one in memory, plus 8 bytes per attribute
+//! A [`UsdWriter`] is given one geometry per frame, or one for each of several outputs, and keeps only the last one in memory, plus 8 bytes per attribute
 //! and frame. An array that equals the previous one of its attribute, by address or bit for bit, is stored once; what
 //! never changes is written as a default value instead of time samples, unless [`UsdWriter::sample_all`] is called. Both file formats are written from one
 //! description of the stage (`layout` maps arrays to attributes, `stage` is the description), and every f32 and i32 is
@@ -10,6 +10,7 @@
 //! The content of a file, for an output called NAME:
 //! * `/NAME` (Xform, the default prim; translated to the scene's origin if it has one) with `curves` (BasisCurves,
 //!   linear), `mesh`, `points` and `tets` under it; metres, Y up, time code = frame.
+//! * With several outputs in one stage, each is an Xform `/NAME/OUTPUT` with its components under it.
 //! * In a frame without a component its arrays are empty; in a frame without an attribute that other frames have, it is
 //!   a value block. Components are not blocked, because a reader that keeps the last value at a block would keep showing
 //!   them.
@@ -89,6 +90,21 @@ impl UsdWriter {
         fps: f64,
         origin: [f64; 3],
     ) -> Result<Self, UsdError> {
+        Self::create_set(path, flavour, (name, &[]), fps, origin)
+    }
+
+    /// Like [`UsdWriter::create`], for a stage with several geometries: each has a prim of its own under the root, of those
+    /// names in `set`, and [`UsdWriter::frames`] takes them in that order. Without names it is a stage of one.
+    ///
+    /// # Errors
+    /// As for [`UsdWriter::create`].
+    pub fn create_set(
+        path: impl Into<PathBuf>,
+        flavour: Flavour,
+        set: (&str, &[&str]),
+        fps: f64,
+        origin: [f64; 3],
+    ) -> Result<Self, UsdError> {
         let path = path.into();
         if !(fps.is_finite() && fps > 0.0) {
             return Err(UsdError::Refused { path, fault: UsdFault::Fps { fps } });
@@ -101,7 +117,9 @@ impl UsdWriter {
             }
             Flavour::Usdc => Box::new(usdc::Writer::new(file).map_err(|source| written(&path, source))?),
         };
-        Ok(Self { path, recorder: Recorder::new(encoder, Header { name: name.into(), fps, origin }) })
+        let members = set.1.iter().map(|name| (*name).to_owned()).collect();
+        let header = Header { name: set.0.into(), fps, origin, members };
+        Ok(Self { path, recorder: Recorder::new(encoder, header) })
     }
 
     /// Adds a frame. Time codes are frame numbers, whole or not, each greater than the one before.
@@ -110,7 +128,15 @@ impl UsdWriter {
     /// If the file cannot be written, the frame does not follow the last one, the geometry has a volume, or an
     /// attribute changed its type. A refused frame does not change the writer; after a failed write all calls fail.
     pub fn frame(&mut self, time_code: f64, geometry: &Geometry) -> Result<(), UsdError> {
-        self.recorder.frame(time_code, geometry).map_err(|fault| located(&self.path, fault))
+        self.frames(time_code, &[geometry])
+    }
+
+    /// Adds a frame of a stage with several geometries, one for each.
+    ///
+    /// # Errors
+    /// As for [`UsdWriter::frame`]; and if there are not as many geometries as the stage has.
+    pub fn frames(&mut self, time_code: f64, geometries: &[&Geometry]) -> Result<(), UsdError> {
+        self.recorder.frame(time_code, geometries).map_err(|fault| located(&self.path, fault))
     }
 
     /// Writes time samples of every attribute, even of those that have one value in all frames. Parts of a sequence can
@@ -184,6 +210,16 @@ pub enum UsdFault {
     Time {
         /// The value.
         time: f64,
+    },
+    /// A frame with another number of geometries than the stage has.
+    #[error("frame {time} has {found} geometries and the stage has {expected}")]
+    Members {
+        /// The frame.
+        time: f64,
+        /// How many it has.
+        found: usize,
+        /// How many there should be.
+        expected: usize,
     },
     /// A frame that does not follow the last one.
     #[error("frame {time} follows frame {last}, expected frames in ascending order")]

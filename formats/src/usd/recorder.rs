@@ -11,7 +11,7 @@ use engine::geometry::{Column, ColumnType, Component, Geometry, Kind, Owner, Top
 use super::UsdFault;
 use super::layout::{self, Derived, Source, TargetName};
 use super::names;
-use super::stage::{Attribute, Encoder, Handle, Prim, Stage, Values, same_bits};
+use super::stage::{Attribute, Encoder, Handle, Prim, PrimGroup, Stage, Values, same_bits};
 
 /// Settings of a stage.
 #[derive(Clone, Debug)]
@@ -22,6 +22,9 @@ pub(super) struct Header {
     pub(super) fps: f64,
     /// The scene's origin, metres.
     pub(super) origin: [f64; 3],
+    /// The names of the prims that hold one geometry each, not yet identifiers; without any there is one geometry, whose
+    /// prims are under the root.
+    pub(super) members: Vec<String>,
 }
 
 /// Why a call failed.
@@ -45,14 +48,20 @@ pub(super) struct Counts {
 pub(super) struct Recorder<W> {
     header: Header,
     times: Vec<f64>,
-    /// The number of points of each frame's components, in the order of [`Kind::ALL`]; `None` without the component.
-    points: Vec<[Option<u32>; 4]>,
-    derived: [Derived; 4],
-    tracks: BTreeMap<(Kind, Source), Track>,
+    members: Vec<Member>,
     store: Store<W>,
     /// Whether attributes that do not change have time samples too.
     all_sampled: bool,
     failed: bool,
+}
+
+/// One of the geometries of each frame.
+#[derive(Default)]
+struct Member {
+    /// The number of points of each frame's components, in the order of [`Kind::ALL`]; `None` without the component.
+    points: Vec<[Option<u32>; 4]>,
+    derived: [Derived; 4],
+    tracks: BTreeMap<(Kind, Source), Track>,
 }
 
 /// The encoder, with counts of stored and of shared arrays.
@@ -72,39 +81,26 @@ struct Track {
 impl<W> Recorder<W> {
     /// A recorder without frames.
     pub(super) fn new(encoder: Box<dyn Encoder<W>>, header: Header) -> Self {
+        let members = (0..header.members.len().max(1)).map(|_| Member::default()).collect();
         Self {
             header,
             times: Vec::new(),
-            points: Vec::new(),
-            derived: Default::default(),
-            tracks: BTreeMap::new(),
+            members,
             store: Store { encoder, stored: 0, shared: 0 },
             all_sampled: false,
             failed: false,
         }
     }
 
-    /// Adds a frame.
-    pub(super) fn frame(&mut self, time: f64, geometry: &Geometry) -> Result<(), Fault> {
+    /// Adds a frame: a geometry for each member.
+    pub(super) fn frame(&mut self, time: f64, geometries: &[&Geometry]) -> Result<(), Fault> {
         self.refuse_after_failure()?;
-        self.check(time, geometry)?;
+        self.check(time, geometries)?;
         self.failed = true;
-        let mut points = [None; 4];
-        for part in geometry.parts() {
-            let kind = part.kind();
-            // Below 2³¹, as checked.
-            points[kind as usize] = Some(part.point_count() as u32);
-            for (source, column) in self.derived[kind as usize].arrays(part) {
-                self.record((kind, source), column)?;
-            }
-        }
-        for ((kind, source), track) in &mut self.tracks {
-            if track.samples.len() == self.times.len() {
-                track.record_absence(*kind, source, points[*kind as usize], &mut self.store)?;
-            }
+        for (member, geometry) in self.members.iter_mut().zip(geometries) {
+            member.frame(geometry, self.times.len(), &mut self.store)?;
         }
         self.times.push(time);
-        self.points.push(points);
         self.failed = false;
         Ok(())
     }
@@ -117,59 +113,42 @@ impl<W> Recorder<W> {
     /// Writes the structure and returns the file.
     pub(super) fn finish(mut self) -> Result<(W, Counts), Fault> {
         self.refuse_after_failure()?;
-        self.record_default_width()?;
-        let Self { header, times, tracks, store, all_sampled, .. } = self;
+        for member in &mut self.members {
+            member.record_default_width(self.all_sampled, &mut self.store)?;
+        }
+        let Self { header, times, members, store, all_sampled, .. } = self;
         let counts = Counts { frames: times.len(), stored: store.stored, shared: store.shared };
-        let mut by_kind: BTreeMap<Kind, Vec<(Source, Track)>> = BTreeMap::new();
-        for ((kind, source), track) in tracks {
-            by_kind.entry(kind).or_default().push((source, track));
-        }
-        let name = names::identifier(&header.name);
-        let stage = Stage {
-            display_name: (name != header.name).then_some(header.name),
-            name,
-            fps: header.fps,
-            origin: header.origin,
-            times,
-            prims: by_kind.into_iter().map(|(kind, tracks)| prim(kind, tracks, all_sampled)).collect(),
-        };
+        let own: Vec<&str> = header.members.iter().map(|name| &**name).collect();
+        let named = names::distinct(&own).into_iter().zip(&header.members);
+        let mut named = named.map(|(name, own)| named_differently(name, own));
+        let groups =
+            members.into_iter().map(|member| PrimGroup { name: named.next(), prims: member.prims(all_sampled) });
+        let groups = groups.collect();
+        let (name, display_name) = named_differently(names::identifier(&header.name), &header.name);
+        let stage = Stage { name, display_name, fps: header.fps, origin: header.origin, times, groups };
         Ok((store.encoder.finish(&stage)?, counts))
-    }
-
-    /// Records [`layout::DEFAULT_WIDTH`] for curves that have widths at no frame: once, or at every point of a part. Where some frames have them, the
-    /// others have got theirs already ([`layout::absent`]).
-    fn record_default_width(&mut self) -> io::Result<()> {
-        let curves = self.points.iter().any(|points| points[Kind::Curves as usize].is_some());
-        let width = Source::Attribute(Owner::Point, WIDTH.name.into());
-        if !curves || self.tracks.contains_key(&(Kind::Curves, width.clone())) {
-            return Ok(());
-        }
-        let column = Column::new(vec![layout::DEFAULT_WIDTH]);
-        let mut track = Track { rows: column.kind(), last: None, samples: Vec::new() };
-        if self.all_sampled {
-            // Other parts may have widths of points, and the interpolation is the same in all.
-            for points in &self.points {
-                track.record_absence(Kind::Curves, &width, points[Kind::Curves as usize], &mut self.store)?;
-            }
-            self.tracks.insert((Kind::Curves, width), track);
-            return Ok(());
-        }
-        track.record(Kind::Curves, &Source::DefaultWidth, column, &mut self.store)?;
-        self.tracks.insert((Kind::Curves, Source::DefaultWidth), track);
-        Ok(())
     }
 
     fn refuse_after_failure(&self) -> io::Result<()> {
         if self.failed { Err(io::Error::other("an earlier frame could not be written")) } else { Ok(()) }
     }
 
-    fn check(&self, time: f64, geometry: &Geometry) -> Result<(), UsdFault> {
+    fn check(&self, time: f64, geometries: &[&Geometry]) -> Result<(), UsdFault> {
+        if geometries.len() != self.members.len() {
+            return Err(UsdFault::Members { time, found: geometries.len(), expected: self.members.len() });
+        }
         if !time.is_finite() {
             return Err(UsdFault::Time { time });
         }
         if let Some(last) = self.times.last().copied().filter(|last| *last >= time) {
             return Err(UsdFault::Order { time, last });
         }
+        self.members.iter().zip(geometries).try_for_each(|(member, geometry)| member.check(time, geometry))
+    }
+}
+
+impl Member {
+    fn check(&self, time: f64, geometry: &Geometry) -> Result<(), UsdFault> {
         if geometry.volume().is_some() {
             return Err(UsdFault::Volume { time });
         }
@@ -189,19 +168,77 @@ impl<W> Recorder<W> {
         Ok(())
     }
 
-    fn record(&mut self, key: (Kind, Source), column: Column) -> io::Result<()> {
+    /// Records the geometry of the frame that is the `count`th, from 0.
+    fn frame<W>(&mut self, geometry: &Geometry, count: usize, store: &mut Store<W>) -> io::Result<()> {
+        let mut points = [None; 4];
+        for part in geometry.parts() {
+            let kind = part.kind();
+            // Below 2³¹, as checked.
+            points[kind as usize] = Some(part.point_count() as u32);
+            for (source, column) in self.derived[kind as usize].arrays(part) {
+                self.record((kind, source), column, store)?;
+            }
+        }
+        for ((kind, source), track) in &mut self.tracks {
+            if track.samples.len() == count {
+                track.record_absence(*kind, source, points[*kind as usize], store)?;
+            }
+        }
+        self.points.push(points);
+        Ok(())
+    }
+
+    /// Its prims, one for each component.
+    fn prims(self, all_sampled: bool) -> Vec<Prim> {
+        let mut by_kind: BTreeMap<Kind, Vec<(Source, Track)>> = BTreeMap::new();
+        for ((kind, source), track) in self.tracks {
+            by_kind.entry(kind).or_default().push((source, track));
+        }
+        by_kind.into_iter().map(|(kind, tracks)| prim(kind, tracks, all_sampled)).collect()
+    }
+
+    /// Records [`layout::DEFAULT_WIDTH`] for curves that have widths at no frame: once, or at every point of a part. Where
+    /// some frames have them, the others have got theirs already ([`layout::absent`]).
+    fn record_default_width<W>(&mut self, all_sampled: bool, store: &mut Store<W>) -> io::Result<()> {
+        let curves = self.points.iter().any(|points| points[Kind::Curves as usize].is_some());
+        let width = Source::Attribute(Owner::Point, WIDTH.name.into());
+        if !curves || self.tracks.contains_key(&(Kind::Curves, width.clone())) {
+            return Ok(());
+        }
+        let column = Column::new(vec![layout::DEFAULT_WIDTH]);
+        let mut track = Track { rows: column.kind(), last: None, samples: Vec::new() };
+        if all_sampled {
+            // Other parts may have widths of points, and the interpolation is the same in all.
+            for points in &self.points {
+                track.record_absence(Kind::Curves, &width, points[Kind::Curves as usize], store)?;
+            }
+            self.tracks.insert((Kind::Curves, width), track);
+            return Ok(());
+        }
+        track.record(Kind::Curves, &Source::DefaultWidth, column, store)?;
+        self.tracks.insert((Kind::Curves, Source::DefaultWidth), track);
+        Ok(())
+    }
+
+    fn record<W>(&mut self, key: (Kind, Source), column: Column, store: &mut Store<W>) -> io::Result<()> {
         let (kind, source) = key.clone();
         if let Some(track) = self.tracks.get_mut(&key) {
-            return track.record(kind, &source, column, &mut self.store);
+            return track.record(kind, &source, column, store);
         }
         let mut track = Track { rows: column.kind(), last: None, samples: Vec::new() };
         for points in &self.points {
-            track.record_absence(kind, &source, points[kind as usize], &mut self.store)?;
+            track.record_absence(kind, &source, points[kind as usize], store)?;
         }
-        track.record(kind, &source, column, &mut self.store)?;
+        track.record(kind, &source, column, store)?;
         self.tracks.insert(key, track);
         Ok(())
     }
+}
+
+/// An identifier, and the name that it stands for if that differs.
+fn named_differently(identifier: String, own: &str) -> (String, Option<String>) {
+    let differs = identifier != own;
+    (identifier, differs.then(|| own.to_owned()))
 }
 
 /// The greatest number of points or corners that an `int` array counts.

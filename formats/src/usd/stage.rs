@@ -39,7 +39,16 @@ pub(super) struct Stage {
     pub(super) origin: [f64; 3],
     /// Time codes, ascending.
     pub(super) times: Vec<f64>,
-    /// Prims under the root.
+    /// Prims with geometry under the root, or under named prims of it.
+    pub(super) groups: Vec<PrimGroup>,
+}
+
+/// Prims with geometry that belong together.
+#[derive(Debug)]
+pub(super) struct PrimGroup {
+    /// The prim between them and the root: its name, an identifier, and the original name if it differs. `None`: there is
+    /// no such prim.
+    pub(super) name: Option<(String, Option<String>)>,
     pub(super) prims: Vec<Prim>,
 }
 

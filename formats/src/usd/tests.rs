@@ -18,14 +18,25 @@ fn fur() -> Component {
 }
 
 fn write_to(flavour: Flavour, name: &str, origin: [f64; 3], frames: &[(f64, Geometry)]) -> Vec<u8> {
+    let frames: Vec<(f64, Vec<&Geometry>)> = frames.iter().map(|(time, geometry)| (*time, vec![geometry])).collect();
+    write_set(flavour, (name, &[]), origin, &frames)
+}
+
+fn write_set(
+    flavour: Flavour,
+    (name, members): (&str, &[&str]),
+    origin: [f64; 3],
+    frames: &[(f64, Vec<&Geometry>)],
+) -> Vec<u8> {
     let file = Cursor::new(Vec::new());
     let encoder: Box<dyn Encoder<Cursor<Vec<u8>>>> = match flavour {
         Flavour::Usda => Box::new(usda::Writer::new(file, Cursor::new(Vec::new()))),
         Flavour::Usdc => Box::new(usdc::Writer::new(file).unwrap()),
     };
-    let mut recorder = Recorder::new(encoder, Header { name: name.into(), fps: 24.0, origin });
-    for (time, geometry) in frames {
-        recorder.frame(*time, geometry).unwrap();
+    let members = members.iter().map(|name| (*name).to_owned()).collect();
+    let mut recorder = Recorder::new(encoder, Header { name: name.into(), fps: 24.0, origin, members });
+    for (time, geometries) in frames {
+        recorder.frame(*time, geometries).unwrap();
     }
     recorder.finish().unwrap().0.into_inner()
 }
@@ -86,6 +97,55 @@ def Xform "fur_2" (
 }
 "#;
     assert_eq!(text_of("fur-2", [1_000_000.5, 0.0, -2.0], &frames), expected);
+}
+
+#[test]
+fn several_outputs_are_prims_of_one_stage() {
+    let (still, mut moved): (Geometry, Component) = (fur().into(), fur());
+    moved.edit(P).unwrap()[0] = [0.5; 3];
+    moved.remove(Owner::Point, "width");
+    let dots: Geometry = Component::points(vec![[1.0; 3]]).into();
+    let (moved, none) = (moved.into(), Geometry::default());
+    let names = ["skin.tets", "skin_tets", "dots", "none"];
+    let frames = [(1.0, vec![&still, &still, &dots, &none]), (2.0, vec![&still, &moved, &dots, &none])];
+    let text = String::from_utf8(write_set(Flavour::Usda, ("set", &names), [0.0, 2.0, 0.0], &frames)).unwrap();
+    let prims: Vec<&str> = text.lines().filter(|line| line.contains("def ")).collect();
+    let expected = [
+        "def Xform \"set\"",
+        "    def Xform \"skin_tets_2\" (",
+        "        def BasisCurves \"curves\"",
+        "    def Xform \"skin_tets\"",
+        "        def BasisCurves \"curves\"",
+        "    def Xform \"dots\"",
+        "        def Points \"points\"",
+        "    def Xform \"none\"",
+    ];
+    assert_eq!(prims, expected);
+    assert!(
+        text.contains(
+            "    def Xform \"skin_tets_2\" (\n        displayName = \"skin.tets\"\n    )\n    {\n        def"
+        )
+    );
+    assert!(text.ends_with("        }\n    }\n\n    def Xform \"none\"\n    {\n    }\n}\n"), "{text}");
+    assert_eq!(text.matches("timeSamples").count(), 3, "points, extent and widths of the one that moves: {text}");
+    for flavour in [Flavour::Usda, Flavour::Usdc] {
+        let bytes = write_set(flavour, ("set", &names), [0.0, 2.0, 0.0], &frames);
+        let stage = UsdStage::open(bytes.into(), NoAssets).unwrap();
+        assert_eq!(stage.members().unwrap(), names);
+        for (time, geometries) in &frames {
+            for (place, geometry) in geometries.iter().enumerate() {
+                let read = stage.read_member(Some(place), *time).unwrap();
+                let [ours, theirs] =
+                    [&read.geometry, *geometry].map(|one| one.curves().map(|part| part.get(P).unwrap().to_vec()));
+                assert_eq!(ours, theirs, "{place} at {time}");
+                assert_eq!(read.geometry.points().is_some(), geometry.points().is_some());
+            }
+            let all = stage.read("", *time, &|_| true).unwrap().geometry;
+            assert_eq!(all.curves().unwrap().point_count(), 10, "as one component");
+        }
+    }
+    let one = write_to(Flavour::Usdc, "set", [0.0; 3], &[(1.0, still)]);
+    assert_eq!(UsdStage::open(one.into(), NoAssets).unwrap().members().unwrap(), [""; 0]);
 }
 
 #[test]

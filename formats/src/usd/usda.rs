@@ -8,7 +8,7 @@ use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 
 use engine::geometry::Column;
 
-use super::stage::{Attribute, Encoder, Handle, Numbers, Prim, Stage, UsdType, Values, numbers};
+use super::stage::{Attribute, Encoder, Handle, Numbers, Prim, PrimGroup, Stage, UsdType, Values, numbers};
 
 /// Size in bytes of the buffers of the file and the spool.
 const BUFFER: usize = 1 << 18;
@@ -44,18 +44,30 @@ impl<W: Write + Send, S: Read + Write + Seek + Send> Encoder<W> for Writer<W, S>
         let Self { mut file, spool, ends } = *self;
         let mut spool = Spool { file: spool.into_inner().map_err(io::IntoInnerError::into_error)?, ends };
         put_header(&mut file, stage)?;
-        let display_name = stage.display_name.iter().map(|name| format!("displayName = {}", quoted(name))).collect();
-        writeln!(file, "\ndef Xform \"{}\"{}\n{{", stage.name, metadata(0, display_name))?;
+        writeln!(file, "\ndef Xform \"{}\"{}\n{{", stage.name, display_name(0, stage.display_name.as_ref()))?;
         if stage.is_moved() {
             let [x, y, z] = stage.origin.map(decimal);
             writeln!(file, "    double3 xformOp:translate = ({x}, {y}, {z})")?;
             writeln!(file, "    uniform token[] xformOpOrder = [\"xformOp:translate\"]")?;
         }
-        for (i, prim) in stage.prims.iter().enumerate() {
-            if i > 0 || stage.is_moved() {
-                writeln!(file)?;
+        let mut is_first = !stage.is_moved();
+        for PrimGroup { name, prims } in &stage.groups {
+            if let Some((name, own)) = name {
+                let gap = if std::mem::take(&mut is_first) { "" } else { "\n" };
+                writeln!(file, "{gap}    def Xform \"{name}\"{}\n    {{", display_name(1, own.as_ref()))?;
+                is_first = true;
             }
-            put_prim(&mut file, &mut spool, prim, &stage.times)?;
+            let depth = if name.is_some() { 2 } else { 1 };
+            for prim in prims {
+                if !std::mem::take(&mut is_first) {
+                    writeln!(file)?;
+                }
+                put_prim(&mut file, &mut spool, prim, &stage.times, depth)?;
+            }
+            if name.is_some() {
+                writeln!(file, "    }}")?;
+                is_first = false;
+            }
         }
         writeln!(file, "}}")?;
         file.into_inner().map_err(io::IntoInnerError::into_error)
@@ -92,15 +104,23 @@ fn put_header(file: &mut impl Write, stage: &Stage) -> io::Result<()> {
     writeln!(file, "    upAxis = \"Y\"\n)")
 }
 
-fn put_prim(file: &mut impl Write, spool: &mut Spool<impl Read + Seek>, prim: &Prim, times: &[f64]) -> io::Result<()> {
-    writeln!(file, "    def {} \"{}\"\n    {{", prim.schema, prim.name)?;
+/// Writes a prim, indented by `depth`.
+fn put_prim(
+    file: &mut impl Write,
+    spool: &mut Spool<impl Read + Seek>,
+    prim: &Prim,
+    times: &[f64],
+    depth: usize,
+) -> io::Result<()> {
+    let indent = "    ".repeat(depth);
+    writeln!(file, "{indent}def {} \"{}\"\n{indent}{{", prim.schema, prim.name)?;
     for (name, value) in prim.tokens {
-        writeln!(file, "        uniform token {name} = \"{value}\"")?;
+        writeln!(file, "{indent}    uniform token {name} = \"{value}\"")?;
     }
     for attribute in &prim.attributes {
-        put_attribute(file, spool, attribute, times)?;
+        put_attribute(file, spool, attribute, times, depth + 1)?;
     }
-    writeln!(file, "    }}")
+    writeln!(file, "{indent}}}")
 }
 
 /// A sampled attribute has its metadata in a separate declaration.
@@ -109,31 +129,38 @@ fn put_attribute(
     spool: &mut Spool<impl Read + Seek>,
     attribute: &Attribute,
     times: &[f64],
+    depth: usize,
 ) -> io::Result<()> {
     let Attribute { name, display_name, kind, interpolation, values } = attribute;
+    let indent = "    ".repeat(depth);
     let display_name = display_name.iter().map(|name| format!("displayName = {}", quoted(name)));
     let interpolation = interpolation.iter().map(|one| format!("interpolation = \"{}\"", one.token()));
     let lines: Vec<String> = display_name.chain(interpolation).collect();
-    let declared = format!("        {} {name}", kind.name());
+    let declared = format!("{indent}{} {name}", kind.name());
     match values {
         Values::Default(handle) => {
             write!(file, "{declared} = ")?;
             spool.copy_to(file, *handle)?;
-            writeln!(file, "{}", metadata(2, lines))
+            writeln!(file, "{}", metadata(depth, lines))
         }
         Values::Samples(handles) => {
             if !lines.is_empty() {
-                writeln!(file, "{declared}{}", metadata(2, lines))?;
+                writeln!(file, "{declared}{}", metadata(depth, lines))?;
             }
             writeln!(file, "{declared}.timeSamples = {{")?;
             for (time, handle) in times.iter().zip(handles) {
-                write!(file, "            {}: ", decimal(*time))?;
+                write!(file, "{indent}    {}: ", decimal(*time))?;
                 spool.copy_to(file, *handle)?;
                 writeln!(file, ",")?;
             }
-            writeln!(file, "        }}")
+            writeln!(file, "{indent}}}")
         }
     }
+}
+
+/// The metadata of a prim that is called otherwise than by its identifier.
+fn display_name(depth: usize, name: Option<&String>) -> String {
+    metadata(depth, name.iter().map(|name| format!("displayName = {}", quoted(name))).collect())
 }
 
 /// ` (…)` with one line each, indented by `depth`; empty without lines.

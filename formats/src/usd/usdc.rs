@@ -10,7 +10,7 @@ use std::io::{self, Seek, SeekFrom, Write};
 use engine::geometry::Column;
 
 use super::coding::ints;
-use super::stage::{Attribute, Encoder, Handle, Numbers, Stage, UsdType, Values, numbers};
+use super::stage::{Attribute, Encoder, Handle, Numbers, Prim, PrimGroup, Stage, UsdType, Values, numbers};
 use super::structure::{Spec, SpecType, Structure};
 
 /// Bytes before the first value.
@@ -207,17 +207,19 @@ impl<W: Write + Seek> Writer<W> {
             let order = self.tokens(rep(id::TOKEN) | ARRAY, &["xformOp:translate"])?;
             xform.children.push(self.attribute("xformOpOrder", "token[]", true, order));
         }
-        for prim in &stage.prims {
-            let mut spec = self.prim(prim.name, prim.schema);
-            for (name, value) in prim.tokens {
-                let value = self.token(value);
-                spec.children.push(self.attribute(name, "token", true, value));
+        for PrimGroup { name, prims } in &stage.groups {
+            let specs = prims.iter().map(|prim| self.geometry(prim, times)).collect::<io::Result<Vec<Spec>>>()?;
+            match name {
+                Some((name, own)) => {
+                    let mut group = self.prim(name, "Xform");
+                    if let Some(own) = own {
+                        group.field("displayName", self.string(own));
+                    }
+                    group.children = specs;
+                    xform.children.push(group);
+                }
+                None => xform.children.extend(specs),
             }
-            for attribute in &prim.attributes {
-                let attribute = self.array_attribute(attribute, times)?;
-                spec.children.push(attribute);
-            }
-            xform.children.push(spec);
         }
         let mut root = Spec::new("", SpecType::PseudoRoot);
         root.field("defaultPrim", self.token(&stage.name));
@@ -228,6 +230,19 @@ impl<W: Write + Seek> Writer<W> {
         root.children.push(xform);
         self.list_children(&mut root)?;
         Ok(root)
+    }
+
+    fn geometry(&mut self, prim: &Prim, times: u64) -> io::Result<Spec> {
+        let mut spec = self.prim(prim.name, prim.schema);
+        for (name, value) in prim.tokens {
+            let value = self.token(value);
+            spec.children.push(self.attribute(name, "token", true, value));
+        }
+        for attribute in &prim.attributes {
+            let attribute = self.array_attribute(attribute, times)?;
+            spec.children.push(attribute);
+        }
+        Ok(spec)
     }
 
     fn prim(&mut self, name: &str, schema: &str) -> Spec {

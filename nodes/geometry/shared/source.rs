@@ -6,11 +6,18 @@ use engine::prelude::*;
 use formats::{Format, FormatError};
 use std::sync::Arc;
 
-/// The component of `kind` in a file; other geometry is ignored.
+/// How many components the file has, of which the node gives one or some.
+pub(crate) const COMPONENTS: Metric = Metric::new(
+    "components",
+    Unit::None,
+    "Components of the file: curves, mesh, points, tets. Notes name files with some that no node reads.",
+);
+
+/// The component of `kind` in a file; other geometry is ignored, but counted.
 ///
 /// # Errors
 /// If the file cannot be read in the format of its extension, or has no such component.
-pub(crate) fn from_file(file: &File, kind: Kind) -> Result<Component> {
+pub(crate) fn from_file(cx: &Cx, file: &File, kind: Kind) -> Result<Component> {
     let path = file.path().display();
     let refused = |error: FormatError| {
         let fact = Error::file(format!("`{path}`: {error}"));
@@ -21,6 +28,7 @@ pub(crate) fn from_file(file: &File, kind: Kind) -> Result<Component> {
     };
     let format = Format::of_path(file.path()).map_err(refused)?;
     let geometry = formats::read(format, &file.bytes()?).map_err(refused)?;
+    cx.publish(COMPONENTS, geometry.kinds().count() as f64);
     geometry.part(kind).cloned().ok_or_else(|| {
         let there: Vec<&str> = geometry.kinds().map(Kind::name).collect();
         let there = if there.is_empty() { "nothing".to_owned() } else { there.join(", ") };

@@ -1,6 +1,7 @@
 //! USD files as the engine opens them.
 
-use std::sync::Arc;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use engine::files::{File, FileFolder};
 use engine::prelude::*;
@@ -10,6 +11,8 @@ use formats::{FilePosition, FormatError};
 /// A USD file with what it references.
 pub(crate) struct UsdSource {
     pub(crate) stage: UsdStage,
+    /// What [`UsdSource::span`] found, by prim.
+    spans: Mutex<BTreeMap<String, Option<[f64; 2]>>>,
 }
 
 /// The folder of a stage.
@@ -33,8 +36,22 @@ impl UsdSource {
     pub(crate) fn of(file: &File) -> Result<Arc<Self>> {
         file.derived(|file| {
             let stage = UsdStage::open(file.bytes()?, StageFolder(file.folder()));
-            Ok(Self { stage: stage.map_err(|error| refused(file, &error))? })
+            Ok(Self { stage: stage.map_err(|error| refused(file, &error))?, spans: Mutex::default() })
         })
+    }
+
+    /// The first and the last time at which what is read at `prim` has samples; `None` if it does not move.
+    ///
+    /// # Errors
+    /// If the file is damaged.
+    pub(crate) fn span(&self, prim: &str) -> std::result::Result<Option<[f64; 2]>, FormatError> {
+        let known = || self.spans.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(span) = known().get(prim).copied() {
+            return Ok(span);
+        }
+        let span = if self.stage.moves(prim)? { self.stage.span(prim)? } else { None };
+        known().insert(prim.to_owned(), span);
+        Ok(span)
     }
 }
 

@@ -67,3 +67,39 @@ fn a_file_without_geometry_is_refused_with_what_it_has() {
     let error = bench(&NODE).try_cook().unwrap_err();
     assert_eq!(error.to_string(), "it has no `file`; name a usdc, usda or usdz file");
 }
+
+#[test]
+fn a_time_outside_of_the_samples_is_published() {
+    let (_folder, file) = stage(STAGE);
+    let held = |frame: f64, prim: &str| {
+        let bench = bench(&NODE).source(FILE.name(), file.clone()).set(FRAME, frame).set(PRIM, prim.into());
+        bench.cook().metrics[HELD.name]
+    };
+    assert_eq!([0.0, 1.0, 16.0, 31.0, 40.5].map(|frame| held(frame, "")), [1.0, 0.0, 0.0, 0.0, 9.5]);
+    assert_eq!(held(40.0, "/set/skin"), 0.0, "what does not move is never held");
+}
+
+#[test]
+fn what_is_invisible_at_times_is_nothing_there() {
+    let body = STAGE.replace(
+        "def Xform \"set\" {",
+        "def Xform \"set\" {\n token visibility.timeSamples = { 1: \"inherited\", 3: \"invisible\", 5: \"inherited\" }",
+    );
+    let (_folder, file) = stage(&body);
+    let kinds = |frame: f64| {
+        let out = bench(&NODE).source(FILE.name(), file.clone()).set(FRAME, frame).cook();
+        out.geometry.kinds().next().is_some()
+    };
+    assert_eq!([2.0, 3.0, 4.5, 5.0].map(kinds), [true, false, false, true]);
+}
+
+#[test]
+fn numbers_that_are_not_finite_are_refused_by_file_and_attribute() {
+    let (_folder, file) = stage(&STAGE.replace("float[] widths = [0.5]", "float[] widths = [nan]"));
+    let error = bench(&NODE).source(FILE.name(), file).try_cook().unwrap_err();
+    assert!(
+        error.fact.ends_with("in.usda` has a NaN or infinity: `width` of the curves in row 0, counted from 0"),
+        "{error}"
+    );
+    assert!(error.hint.unwrap().starts_with("`convect stats FILE --frame F` counts them"));
+}

@@ -78,7 +78,10 @@ fn unused_nodes(graph: &Graph) -> Vec<Note> {
 fn similar_names(graph: &Graph) -> Vec<Note> {
     let mut by_name: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for output in &graph.outputs {
-        by_name.entry(output.name.to_lowercase()).or_default().push(&output.name);
+        let names = by_name.entry(output.file().to_lowercase()).or_default();
+        if !names.contains(&output.file()) {
+            names.push(output.file());
+        }
     }
     let same = by_name.into_values().filter(|names| names.len() > 1);
     let note = |names: Vec<&str>| {

@@ -1,11 +1,13 @@
 //! Outputs: which node outputs are written, with which attributes, and whether with velocities.
 
+use std::collections::BTreeSet;
+
 use super::Draft as NodeDraft;
 use super::document::{check_name, missing};
 use super::wires::{Nodes, Wire};
 use crate::geometry::Name;
 use crate::graph::fault::{Fault, code};
-use crate::graph::json::{Entry, Json, find, keep, refuse_unknown};
+use crate::graph::json::{Entry, Json, find, keep, refuse_unknown, shown};
 
 /// An output as far as it is valid.
 pub(super) struct Draft {
@@ -34,30 +36,65 @@ pub(super) fn read<'a>(
         faults.push(fault.hint("name at least one output: {\"name\": \"node\"}"));
     }
     let nodes = Nodes::of(drafts);
-    Some(entries.iter().filter_map(|entry| output(entry, &nodes, faults)).collect())
+    Some(entries.iter().flat_map(|entry| file(entry, &nodes, faults)).collect())
 }
 
-fn output<'a>(entry: &Entry<'a>, nodes: &Nodes<'_, 'a>, faults: &mut Vec<Fault>) -> Option<Draft> {
+/// The outputs in one file: one, or those of a list.
+fn file<'a>(entry: &Entry<'a>, nodes: &Nodes<'_, 'a>, faults: &mut Vec<Fault>) -> Vec<Draft> {
     check_name(entry, "an output", faults);
     if entry.name.len() > LONGEST_NAME {
         let fault = entry.fault(code::BAD_NAME, format!("the name of the output has {} characters", entry.name.len()));
         faults.push(fault.hint(format!("its files are named after it; expected at most {LONGEST_NAME}")));
     }
-    let name: Name = entry.name.into();
-    if entry.json.string().is_some() {
-        let Wire { node, port, .. } = nodes.resolve(&entry.json, faults)?;
-        return Some(Draft { name, node, port, attributes: None, v: false });
+    let Some(items) = entry.json.elements() else {
+        let name = |_: &str| entry.name.into();
+        return output(&entry.json, &name, nodes, EXPECTED, faults).into_iter().collect();
+    };
+    if items.is_empty() {
+        let fault = entry.json.fault(code::NO_OUTPUTS, "the list is empty, so its file would be too");
+        faults.push(fault.hint("list the nodes that it holds: [\"id\", …]"));
     }
-    let members = entry.json.members("a node \"id\", or {\"from\": \"id\", \"attributes\": […], \"v\": true}", faults);
-    let entries = keep(members, faults)?;
+    let mut names = BTreeSet::new();
+    let mut drafts = Vec::with_capacity(items.len());
+    for (index, item) in items.iter().enumerate() {
+        let json = entry.json.item(item, index);
+        let name = |from: &str| format!("{}/{from}", entry.name).into();
+        let Some(draft) = output(&json, &name, nodes, EXPECTED_IN_LIST, faults) else { continue };
+        if !names.insert(draft.name.clone()) {
+            let prim = draft.name.split_once('/').map_or("", |(_, prim)| prim);
+            let fault = json.fault(code::DOUBLED_OUTPUT, format!("`{}` is in the list twice", shown(prim)));
+            faults.push(fault.hint("each is a prim of its own, named after it; remove one"));
+        }
+        drafts.push(draft);
+    }
+    drafts
+}
+
+const EXPECTED: &str = "a node \"id\", a list of them, or {\"from\": \"id\", \"attributes\": […], \"v\": true}";
+const EXPECTED_IN_LIST: &str = "a node \"id\", or {\"from\": \"id\", \"attributes\": […], \"v\": true}";
+
+/// An output, whose name follows from the wire as it is written.
+fn output<'a>(
+    json: &Json<'a>,
+    name: &dyn Fn(&str) -> Name,
+    nodes: &Nodes<'_, 'a>,
+    expected: &str,
+    faults: &mut Vec<Fault>,
+) -> Option<Draft> {
+    if let Some(wire) = json.string() {
+        let Wire { node, port, .. } = nodes.resolve(json, faults)?;
+        return Some(Draft { name: name(wire), node, port, attributes: None, v: false });
+    }
+    let entries = keep(json.members(expected, faults), faults)?;
     refuse_unknown(&entries, &["from", "attributes", "v"], "keys of an output", faults);
     let attributes = find(&entries, "attributes").map(|entry| attributes(&entry.json, faults));
     let v = find(&entries, "v").is_some_and(|entry| keep(entry.json.bool(), faults).unwrap_or(false));
     let Some(from) = find(&entries, "from") else {
-        faults.push(missing(&entry.json, "from", "`from` names the node: {\"from\": \"id\"}"));
+        faults.push(missing(json, "from", "`from` names the node: {\"from\": \"id\"}"));
         return None;
     };
     let Wire { node, port, .. } = nodes.resolve(&from.json, faults)?;
+    let name = name(from.json.string().unwrap_or_default());
     Some(Draft { name, node, port, attributes: attributes.flatten(), v })
 }
 

@@ -125,7 +125,7 @@ fn shared_definitions() -> Map<String, Value> {
             json!({"$ref": "#/$defs/expressions-3"}),
             json!({"$ref": "#/$defs/ramp"}),
         ]),
-        "output": any_of(vec![
+        "written": any_of(vec![
             json!({"$ref": "#/$defs/link"}),
             json!({
                 "type": "object",
@@ -139,6 +139,13 @@ fn shared_definitions() -> Map<String, Value> {
                     },
                     "v": {"description": "Whether to write velocities.", "type": "boolean", "default": false},
                 },
+            }),
+        ]),
+        "output": any_of(vec![
+            json!({"$ref": "#/$defs/written"}),
+            json!({
+                "description": "Outputs in one USD stage, each a prim of its own.",
+                "type": "array", "items": {"$ref": "#/$defs/written"}, "minItems": 1, "uniqueItems": true,
             }),
         ]),
     });

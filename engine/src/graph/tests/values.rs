@@ -2,7 +2,7 @@
 
 use std::io::ErrorKind;
 
-use super::super::{Body, Graph, Link, Scene, probe};
+use super::super::{Body, Graph, Link, Part, Scene, probe};
 use super::{good, load_with};
 use crate::geometry::Column;
 use crate::param::{Source, Value, euler_to_turn};
@@ -55,6 +55,19 @@ fn nodes_are_sorted_after_their_sources_and_links_are_renumbered() {
     let output = &graph.outputs[0];
     assert_eq!((output.from, output.v), (Link { node: 2, port: 1 }, true));
     assert_eq!(output.attributes.as_deref(), Some(&["P".into()][..]));
+}
+
+#[test]
+fn outputs_of_a_list_share_a_file() {
+    let graph = good(
+        r#"{"convect": 1, "outputs": {"one": "b", "set": ["b", {"from": "soft.tets", "attributes": ["P"], "v": true}]}, "nodes": {
+            "soft": {"type": "Softbody", "inputs": {"bodies": ["b"]}}, "b": {"type": "Mesh_In"}}}"#,
+    );
+    let names: Vec<(&str, Option<&str>)> = graph.outputs.iter().map(|output| (output.file(), output.prim())).collect();
+    assert_eq!(names, [("one", None), ("set", Some("b")), ("set", Some("soft.tets"))]);
+    assert_eq!((&graph.outputs[1].from, graph.outputs[2].v), (&graph.outputs[0].from, true));
+    let place = graph.place("graph.json", Part::Output("set/b"));
+    assert_eq!(place, "graph.json:1:40", "that of the list");
 }
 
 #[test]

@@ -19,6 +19,8 @@ pub(super) struct Clips {
     files: Vec<String>,
     /// From which time on which file is read; times increase.
     active: Vec<(f64, usize)>,
+    /// The last time, if the stage says it.
+    last: Option<f64>,
 }
 
 /// The clips of a prim that has them.
@@ -56,11 +58,19 @@ pub(super) fn of(layer: &Layer, node: u32) -> Result<Clips> {
     let active = active.filter(|active| in_order && !active.is_empty());
     let active =
         active.ok_or_else(|| other("has value clips whose `active` names no files, or is not in the order of time"))?;
-    if pairs(layer, entry("times"))?.iter().any(|(stage, clip)| stage != clip) {
+    let times = pairs(layer, entry("times"))?;
+    if times.iter().any(|(stage, clip)| stage != clip) {
         return Err(other("has value clips at other times than the stage's, which are not read"));
     }
     let files = files.iter().map(|file| file.to_string()).collect();
-    Ok(Clips { node, anchor: String::new(), prim: prim.trim_end_matches('/').to_owned(), files, active })
+    Ok(Clips {
+        node,
+        anchor: String::new(),
+        prim: prim.trim_end_matches('/').to_owned(),
+        files,
+        active,
+        last: times.last().map(|(time, _)| *time),
+    })
 }
 
 fn pairs(layer: &Layer, handle: Option<Handle>) -> Result<Vec<(f64, f64)>> {
@@ -75,6 +85,11 @@ impl Clips {
     /// The same for the prim at that path of the stage.
     pub(super) fn anchored(&self, path: &str) -> Self {
         Self { anchor: path.to_owned(), ..self.clone() }
+    }
+
+    /// The first and the last time, if the stage says it.
+    pub(super) fn span(&self) -> Option<[f64; 2]> {
+        Some([self.active.first()?.0, self.last?])
     }
 
     /// Which entry of `active` holds at a time.

@@ -70,6 +70,8 @@ pub struct UsdReading {
     pub geometry: Geometry,
     /// What was left out and why, a sentence each.
     pub notes: Vec<String>,
+    /// Whether prims are left out that are invisible at this time, and perhaps not at others.
+    pub hides_some: bool,
 }
 
 impl UsdStage {
@@ -80,13 +82,13 @@ impl UsdStage {
     /// If there is no such prim, it is composed in a way that is not read, or the file is damaged there.
     pub fn read(&self, prim: &str, time: f64, wants: &dyn Fn(&str) -> bool) -> Result<UsdReading> {
         let mut notes = Vec::new();
-        let placed = self.placed_prims(prim, time, &mut notes)?;
+        let (placed, hides_some) = self.placed_prims(prim, time, &mut notes)?;
         let mut parts = Vec::with_capacity(placed.len());
         for placed in &placed {
             parts.extend(self.part(placed, time, wants, &mut notes)?);
         }
         let geometry = join::joined(parts, &mut notes)?;
-        Ok(UsdReading { geometry, notes })
+        Ok(UsdReading { geometry, notes, hides_some })
     }
 
     /// Frames and time codes a second.

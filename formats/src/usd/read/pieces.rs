@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::layer::{Array, NodeKind, Value};
 use super::matrix::Matrix;
-use super::stage::{FLATTEN, UsdStage, rate, refused};
+use super::stage::{FLATTEN, Prim, UsdStage, rate, refused};
 use super::walk::Placed;
 use super::{UsdReading, join};
 use crate::usd::usda::{decimal, quoted};
@@ -13,6 +13,9 @@ use crate::{FilePosition, FormatError, Result};
 
 /// Prims of such files are nested no deeper.
 const DEEPEST: usize = 8;
+
+/// The names of prims with geometry in files that convect writes.
+const KINDS: [&str; 4] = ["curves", "mesh", "points", "tets"];
 
 /// A piece of a sequence: its file as the stage names it, and the time from which on it is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,19 +39,60 @@ struct Declared {
 }
 
 impl UsdStage {
-    /// Reads like [`UsdStage::read`], but leaves positions as they are written: without transforms, unit and axes.
+    /// The names of the outputs that the file holds, in order, if convect wrote it with several: each has a prim under the
+    /// default prim. None if it holds a single one, or is by another program.
     ///
     /// # Errors
     /// If the file is damaged.
-    pub fn read_unplaced(&self, time: f64) -> Result<UsdReading> {
+    pub fn members(&self) -> Result<Vec<String>> {
+        let text = |prim: &Prim, field: &str| -> Result<Option<String>> {
+            Ok(self.field(prim, field)?.as_ref().and_then(Value::text).map(str::to_owned))
+        };
+        let mut names = Vec::new();
+        for prim in self.member_prims()? {
+            let has_own =
+                prim.sites.iter().any(|site| self.layers[site.layer].1.properties(site.node).next().is_some());
+            let holds_else = self.children(&prim)?.iter().any(|child| !KINDS.contains(&last_name(child)));
+            if has_own || holds_else || self.schema(&prim)? != "Xform" {
+                return Ok(Vec::new());
+            }
+            names.push(text(&prim, "displayName")?.unwrap_or_else(|| last_name(&prim).to_owned()));
+        }
+        Ok(names)
+    }
+
+    /// The prims under the default prim.
+    fn member_prims(&self) -> Result<Vec<Prim>> {
+        let first = self.children(&self.top())?.into_iter().next();
+        first.map_or_else(|| Ok(Vec::new()), |prim| self.children(&prim))
+    }
+
+    /// The path of the prim of an output, by its position in [`UsdStage::members`].
+    ///
+    /// # Errors
+    /// If there is none, or the file is damaged.
+    pub fn member_path(&self, member: usize) -> Result<String> {
+        let prim = self.member_prims()?.into_iter().nth(member);
+        let missing = || FormatError::at(FilePosition::File, format!("it holds at most {member} outputs"));
+        prim.map(|prim| prim.path).ok_or_else(missing)
+    }
+
+    /// Reads like [`UsdStage::read`], but leaves positions as they are written: without transforms, unit and axes. `member`
+    /// is a position in [`UsdStage::members`]; `None` reads all.
+    ///
+    /// # Errors
+    /// If there is no such output, or the file is damaged.
+    pub fn read_member(&self, member: Option<usize>, time: f64) -> Result<UsdReading> {
+        let path = member.map_or_else(|| Ok(String::new()), |member| self.member_path(member))?;
         let mut notes = Vec::new();
-        let placed = self.placed_prims("", time, &mut notes)?.into_iter();
-        let placed = placed.map(|placed| Placed { matrix: Matrix::IDENTITY, rest: Matrix::IDENTITY, ..placed });
+        let (placed, hides_some) = self.placed_prims(&path, time, &mut notes)?;
+        let placed =
+            placed.into_iter().map(|placed| Placed { matrix: Matrix::IDENTITY, rest: Matrix::IDENTITY, ..placed });
         let mut parts = Vec::new();
         for placed in placed {
             parts.extend(self.part(&placed, time, &|_| true, &mut notes)?);
         }
-        Ok(UsdReading { geometry: join::joined(parts, &mut notes)?, notes })
+        Ok(UsdReading { geometry: join::joined(parts, &mut notes)?, notes, hides_some })
     }
 
     /// Where the default prim is translated to: the scene's origin in a file that convect wrote.
@@ -186,4 +230,9 @@ impl UsdStage {
         }
         Ok(())
     }
+}
+
+/// The last name of a prim's path.
+fn last_name(prim: &Prim) -> &str {
+    prim.path.rsplit('/').next().unwrap_or_default()
 }

@@ -325,9 +325,9 @@ impl UsdStage {
         }
         let array = match array {
             // A single value.
-            Array::Other => match values.value()?.and_then(single) {
-                Some(single) => single,
-                None => return Ok(Some(Err("has a type that has no meaning here".into()))),
+            Array::Other => match values.value()?.map(|value| self.single(prim, attribute, value)).transpose()? {
+                Some(Some(single)) => single,
+                _ => return Ok(Some(Err("has a type that has no meaning here".into()))),
             },
             array => array,
         };
@@ -344,18 +344,29 @@ impl UsdStage {
         };
         Ok(Some(Ok((array, interpolation))))
     }
-}
 
-/// A single value as an array of one row.
-fn single(value: Value) -> Option<Array> {
-    match value {
-        Value::Double(x) => Some(Array::F1(vec![x as f32])),
-        Value::Int(i) => i32::try_from(i).ok().map(|i| Array::I1(vec![i])),
-        Value::Numbers(numbers) if (2..=4).contains(&numbers.len()) => {
-            let width = numbers.len();
-            Some(Array::Doubles(numbers, width))
-        }
-        Value::Quaternion(q) => Some(Array::Quaternions(vec![q.map(|x| x as f32)])),
-        _ => None,
+    /// A single value as an array of one row.
+    fn single(&self, prim: &Prim, attribute: &str, value: Value) -> Result<Option<Array>> {
+        let numbers = match value {
+            Value::Double(x) => return Ok(Some(Array::F1(vec![x as f32]))),
+            Value::Int(i) => {
+                return Ok(Some(i32::try_from(i).map_or_else(|_| Array::Long(vec![i]), |i| Array::I1(vec![i]))));
+            }
+            Value::Quaternion(q) => return Ok(Some(Array::Quaternions(vec![q.map(|x| x as f32)]))),
+            Value::Numbers(numbers) => numbers,
+            _ => return Ok(None),
+        };
+        let kind = self.metadata(prim, attribute, "typeName")?;
+        let is_whole = kind.as_ref().and_then(Value::text).is_some_and(|name| name.starts_with("int"));
+        Ok(match (is_whole, &numbers[..]) {
+            (true, [a, b]) => Some(Array::I2(vec![[*a as i32, *b as i32]])),
+            (true, [a, b, c]) => Some(Array::I3(vec![[*a as i32, *b as i32, *c as i32]])),
+            (true, [a, b, c, d]) => Some(Array::I4(vec![[*a as i32, *b as i32, *c as i32, *d as i32]])),
+            (false, [_, _] | [_, _, _] | [_, _, _, _]) => {
+                let width = numbers.len();
+                Some(Array::Doubles(numbers, width))
+            }
+            _ => None,
+        })
     }
 }

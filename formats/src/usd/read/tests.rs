@@ -77,7 +77,7 @@ fn primvars_of_each_interpolation_get_their_owner() {
         string[] primvars:names = [\"a\"] ( interpolation = \"constant\" )
         float[] primvars:short = [1, 2] ( interpolation = \"vertex\" )
     }";
-    let UsdReading { geometry, notes } = read(body, 1.0);
+    let UsdReading { geometry, notes, .. } = read(body, 1.0);
     let curves = geometry.curves().unwrap();
     assert_eq!(curves.runs().starts(), [0, 2, 3]);
     assert_eq!(curves.get(V), Some(&[[1.0, 0.0, 0.0]; 3][..]));
@@ -192,12 +192,40 @@ fn what_does_not_change_is_shared_between_times() {
 }
 
 #[test]
+fn single_values_keep_their_type() {
+    let body = "def Points \"a\" {\n point3f[] points = [(2, 0, 0), (3, 0, 0)]\n int primvars:i = 16777217\n \
+        uint primvars:u = 7\n bool primvars:b = true\n float primvars:f = 7\n double primvars:d = 0.5\n \
+        int3 primvars:three = (1, -2, 3)\n int64 primvars:long = 5000000000\n}\n";
+    let UsdReading { geometry, notes, hides_some } = read(body, 1.0);
+    let points = geometry.points().unwrap();
+    let column = |name: &str| points.table(Owner::Once).column(name).unwrap().clone();
+    assert_eq!(column("i"), Column::new(vec![16_777_217]));
+    assert_eq!([column("u"), column("b")], [Column::new(vec![7]), Column::new(vec![1])]);
+    assert_eq!([column("f"), column("d")], [Column::new(vec![7.0_f32]), Column::new(vec![0.5_f32])]);
+    assert_eq!(column("three"), Column::new(vec![[1, -2, 3]]));
+    assert_eq!(notes, ["`primvars:long` of `/a` has whole numbers beyond 32 bits, so it is not read"]);
+    assert!(!hides_some);
+}
+
+#[test]
+fn the_span_is_that_of_all_samples() {
+    let stage = opened(
+        "def Xform \"a\" {\n double3 xformOp:translate.timeSamples = { 3: (0, 0, 0), 7: (1, 0, 0) }\n uniform token[] xformOpOrder = \
+         [\"xformOp:translate\"]\n def Points \"p\" {\n point3f[] points.timeSamples = { 5: [(0, 0, 0)], 9: [(1, 0, 0)] }\n}\n}\n",
+    )
+    .unwrap();
+    assert_eq!((stage.span("").unwrap(), stage.span("/a/p").unwrap()), (Some([3.0, 9.0]), Some([3.0, 9.0])));
+    let still = opened(&format!("def Mesh \"m\" {{\n{TRIANGLE}}}")).unwrap();
+    assert_eq!(still.span("").unwrap(), None);
+}
+
+#[test]
 fn several_prims_of_a_kind_are_joined_in_the_order_of_the_stage() {
     let body = "def Xform \"b\" {\n def Points \"x\" {\n point3f[] points = [(1, 0, 0)]\n float[] widths = [3]\n \
         float primvars:gain = 5\n}\n}\ndef Points \"a\" {\n point3f[] points = [(2, 0, 0), (3, 0, 0)]\n}\n\
         def Sphere \"s\" {\n}\ndef Points \"hidden\" {\n point3f[] points = [(0, 0, 0)]\n token visibility = \"invisible\"\n}\n\
         over \"only\" {\n def Points \"p\" {\n point3f[] points = [(0, 0, 0)]\n}\n}\n";
-    let UsdReading { geometry, notes } = read(body, 1.0);
+    let UsdReading { geometry, notes, .. } = read(body, 1.0);
     let points = geometry.points().unwrap();
     assert_eq!(points.positions(), [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 0.0, 0.0]]);
     assert_eq!(points.get(WIDTH), Some(&[3.0, 0.0, 0.0][..]));

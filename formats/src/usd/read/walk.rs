@@ -54,6 +54,14 @@ const NOT_READ: [&str; 12] = [
     "Volume",
 ];
 
+/// When a prim is not seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Hidden {
+    Always,
+    /// At this time, and perhaps not at others.
+    Now,
+}
+
 /// A prim whose children are to be visited.
 struct Open {
     prim: Prim,
@@ -63,9 +71,9 @@ struct Open {
 }
 
 impl UsdStage {
-    /// The prims with geometry at and under the prim at `path`, at a time, in the order of the stage. What is left out is
-    /// said in `notes`.
-    pub(super) fn placed_prims(&self, path: &str, time: f64, notes: &mut Vec<String>) -> Result<Vec<Placed>> {
+    /// The prims with geometry at and under the prim at `path`, at a time, in the order of the stage, and whether some are
+    /// invisible only at times. What is left out is said in `notes`.
+    pub(super) fn placed_prims(&self, path: &str, time: f64, notes: &mut Vec<String>) -> Result<(Vec<Placed>, bool)> {
         let top = to_ours(self.root())?;
         let mut found = Vec::new();
         let mut open = Vec::new();
@@ -73,8 +81,11 @@ impl UsdStage {
         let line = self.prim(path)?;
         let last = line.len() - 1;
         for (depth, prim) in line.into_iter().enumerate() {
-            if depth > 0 && (!self.is_defined(&prim)? || self.is_hidden(&prim, time, notes)?) {
-                return Ok(found);
+            if depth > 0 && !self.is_defined(&prim)? {
+                return Ok((found, false));
+            }
+            if let Some(hidden) = (depth > 0).then(|| self.hidden(&prim, time, notes)).transpose()?.flatten() {
+                return Ok((found, hidden == Hidden::Now));
             }
             if depth > 0 {
                 matrix = self.placed(&prim, &matrix, &top, time)?;
@@ -84,6 +95,7 @@ impl UsdStage {
                 open.push(Open { prim, matrix, rest, depth });
             }
         }
+        let mut hides_some = false;
         while let Some(Open { prim, matrix, rest, depth }) = open.pop() {
             if depth > DEEPEST {
                 return Err(refused(
@@ -102,33 +114,51 @@ impl UsdStage {
                 }
             }
             for child in self.children(&prim)?.into_iter().rev() {
-                if self.is_defined(&child)? && !self.is_hidden(&child, time, notes)? {
-                    let matrix = self.placed(&child, &matrix, &top, time)?;
-                    let rest = self.placed(&child, &rest, &top, FIRST)?;
-                    open.push(Open { prim: child, matrix, rest, depth: depth + 1 });
+                if !self.is_defined(&child)? {
+                    continue;
                 }
+                if let Some(hidden) = self.hidden(&child, time, notes)? {
+                    hides_some |= hidden == Hidden::Now;
+                    continue;
+                }
+                let matrix = self.placed(&child, &matrix, &top, time)?;
+                let rest = self.placed(&child, &rest, &top, FIRST)?;
+                open.push(Open { prim: child, matrix, rest, depth: depth + 1 });
             }
         }
-        Ok(found)
+        Ok((found, hides_some))
     }
 
-    /// Whether renderers do not see a prim and what is under it.
-    fn is_hidden(&self, prim: &Prim, time: f64, notes: &mut Vec<String>) -> Result<bool> {
+    /// Whether and when renderers do not see a prim and what is under it; `None` if they see it.
+    fn hidden(&self, prim: &Prim, time: f64, notes: &mut Vec<String>) -> Result<Option<Hidden>> {
         let text = |name: &str| -> Result<Option<String>> {
             let value = self.sampled(prim, name, time)?.value()?;
             Ok(value.as_ref().and_then(Value::text).map(str::to_owned))
         };
         if text("visibility")?.as_deref() == Some("invisible") {
+            if self.has_samples(prim, "visibility") {
+                notes.push(format!("`{}` is invisible at this time, so it is not read here", prim.path));
+                return Ok(Some(Hidden::Now));
+            }
             notes.push(format!("`{}` is invisible, so it is not read", prim.path));
-            return Ok(true);
+            return Ok(Some(Hidden::Always));
         }
         match text("purpose")?.as_deref() {
             Some(purpose @ ("proxy" | "guide")) => {
                 notes.push(format!("`{}` is a {purpose}, so it is not read", prim.path));
-                Ok(true)
+                Ok(Some(Hidden::Always))
             }
-            _ => Ok(false),
+            _ => Ok(None),
         }
+    }
+
+    /// Whether an attribute of a prim has time samples, or may have some in clips.
+    fn has_samples(&self, prim: &Prim, name: &str) -> bool {
+        let of_site = |site: &super::stage::Site| {
+            let layer = &self.layers[site.layer].1;
+            layer.property(site.node, name).is_some_and(|property| layer.field(property, "timeSamples").is_some())
+        };
+        prim.clips.is_some() || prim.sites.iter().any(of_site)
     }
 
     /// Calls `seen` for the samples of each attribute at and under the prim at `path`, and of transforms above it.
@@ -173,6 +203,24 @@ impl UsdStage {
         let mut moves = false;
         self.each_samples(prim, &mut |_, values| moves |= values.windows(2).any(|pair| pair[0] != pair[1]))?;
         Ok(moves)
+    }
+
+    /// The first and the last time at which anything at `prim` has a sample; `None` without any. Of clips it is what the stage
+    /// says, because only the clip of a time is read.
+    ///
+    /// # Errors
+    /// If there is no such prim, or the file is damaged.
+    pub fn span(&self, prim: &str) -> Result<Option<[f64; 2]>> {
+        let mut span: Option<[f64; 2]> = None;
+        let mut widen = |first: f64, last: f64| {
+            span = Some(span.map_or([first, last], |[a, b]| [a.min(first), b.max(last)]));
+        };
+        self.each_samples(prim, &mut |times, _| {
+            // Scaled by less than 0 they descend.
+            times.iter().for_each(|time| widen(*time, *time));
+        })?;
+        self.clip_sets().iter().filter_map(|clips| clips.span()).for_each(|[first, last]| widen(first, last));
+        Ok(span)
     }
 
     /// The times at which anything at `prim` has a sample, ascending.

@@ -39,19 +39,26 @@ impl Encoder<Vec<String>> for Listing {
             let display_name = attribute.display_name.as_ref().map(|name| format!(" ({name})")).unwrap_or_default();
             format!("{}.{}{display_name}{values}", prim.name, attribute.name)
         };
-        let lines = stage.prims.iter().flat_map(|prim| prim.attributes.iter().map(move |a| line(prim, a)));
+        let lines = stage
+            .groups
+            .iter()
+            .flat_map(|group| &group.prims)
+            .flat_map(|prim| prim.attributes.iter().map(move |a| line(prim, a)));
         Ok(lines.collect())
     }
 }
 
 fn recorder() -> Recorder<Vec<String>> {
-    Recorder::new(Box::new(Listing::default()), Header { name: "fur".into(), fps: 24.0, origin: [0.0; 3] })
+    Recorder::new(
+        Box::new(Listing::default()),
+        Header { name: "fur".into(), fps: 24.0, origin: [0.0; 3], members: Vec::new() },
+    )
 }
 
 fn recorded(frames: &[Geometry]) -> (Vec<String>, Counts) {
     let mut recorder = recorder();
     for (time, geometry) in (1_u32..).zip(frames) {
-        recorder.frame(time.into(), geometry).unwrap();
+        recorder.frame(time.into(), &[geometry]).unwrap();
     }
     recorder.finish().unwrap()
 }
@@ -156,7 +163,7 @@ fn names_become_distinct_identifiers_and_are_kept_as_display_names() {
 #[test]
 fn a_refused_frame_gives_a_reason_and_changes_nothing() {
     let mut recorder = recorder();
-    let mut refused = |time: f64, geometry: Geometry| recorder.frame(time, &geometry).unwrap_err().to_string();
+    let mut refused = |time: f64, geometry: Geometry| recorder.frame(time, &[&geometry]).unwrap_err().to_string();
     assert_eq!(refused(f64::NAN, curve(0.0).into()), "the frame number is NaN, expected a finite number");
     let grid = Grid { origin: [0.0; 3], cell: 0.1, size: [0; 3] };
     let volume = Volume::new(grid, vec![], [vec![], vec![], vec![]]).unwrap();
@@ -165,24 +172,24 @@ fn a_refused_frame_gives_a_reason_and_changes_nothing() {
     assert_eq!(refused(1.0, with_volume), "frame 1 has a `volume`, which usda and usdc cannot hold; json can");
     let mut part = curve(0.0);
     part.set_column(Owner::Point, "mask", Column::zeros(ColumnType::F1, 2)).unwrap();
-    recorder.frame(1.0, &part.clone().into()).unwrap();
-    let mut refused = |time: f64, geometry: Geometry| recorder.frame(time, &geometry).unwrap_err().to_string();
+    recorder.frame(1.0, &[&part.clone().into()]).unwrap();
+    let mut refused = |time: f64, geometry: Geometry| recorder.frame(time, &[&geometry]).unwrap_err().to_string();
     assert_eq!(refused(1.0, part.clone().into()), "frame 1 follows frame 1, expected frames in ascending order");
     part.set_column(Owner::Point, "mask", Column::zeros(ColumnType::F3, 2)).unwrap();
     assert_eq!(
         refused(2.5, part.into()),
         "`mask` of `curves` is float3 at frame 2.5 and was float before; a USD attribute has one type in all frames"
     );
-    recorder.frame(2.0, &curve(0.0).into()).unwrap();
+    recorder.frame(2.0, &[&curve(0.0).into()]).unwrap();
     assert_eq!(recorder.finish().unwrap().0[3], "curves.primvars:mask = 2 -");
 }
 
 #[test]
 fn after_a_failed_write_every_call_fails() {
-    let header = Header { name: "fur".into(), fps: 24.0, origin: [0.0; 3] };
+    let header = Header { name: "fur".into(), fps: 24.0, origin: [0.0; 3], members: Vec::new() };
     let mut recorder = Recorder::new(Box::new(Listing { rows: vec![], fails: true }), header);
-    assert!(matches!(recorder.frame(1.0, &curve(0.0).into()), Err(Fault::Write(_))));
-    assert!(recorder.frame(2.0, &Geometry::default()).is_err());
+    assert!(matches!(recorder.frame(1.0, &[&curve(0.0).into()]), Err(Fault::Write(_))));
+    assert!(recorder.frame(2.0, &[&Geometry::default()]).is_err());
     assert_eq!(recorder.finish().unwrap_err().to_string(), "an earlier frame could not be written");
 }
 
@@ -192,8 +199,8 @@ fn every_array_is_held_by_the_recorder_only_until_the_next_frame() {
     let first = curve(0.0);
     let positions = || first.table(Owner::Point).column(P.name).unwrap();
     let Column::F3(array) = positions() else { panic!("positions are float3") };
-    recorder.frame(1.0, &first.clone().into()).unwrap();
+    recorder.frame(1.0, &[&first.clone().into()]).unwrap();
     assert!(Arc::strong_count(array) > 1);
-    recorder.frame(2.0, &curve(1.0).into()).unwrap();
+    recorder.frame(2.0, &[&curve(1.0).into()]).unwrap();
     assert_eq!(Arc::strong_count(array), 1);
 }

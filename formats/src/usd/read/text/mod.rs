@@ -83,7 +83,11 @@ fn value(lexer: &mut Lexer<'_>, kind: TextType) -> Result<Value> {
         ("None", _) => Value::Block,
         ("true", _) => Value::Int(1),
         ("false", _) => Value::Int(0),
-        (_, Some(number)) => Value::Double(number),
+        // Not by way of a double, which does not hold all of them.
+        (word, Some(number)) => match word.parse() {
+            Ok(whole) if kind.scalar == Scalar::Int => Value::Int(whole),
+            _ => Value::Double(number),
+        },
         ("", _) => return Err(before.error(format!("{}, expected a value", before.found()))),
         (word, None) => Value::Text(word.into()),
     })
