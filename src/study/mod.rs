@@ -4,14 +4,18 @@
 //! with one reference, beyond the best of them; how far the best is from it is the floor, below which nothing is claimed.
 
 mod bench;
+mod direction;
 mod extremes;
 mod knobs;
 mod measure;
+mod model;
 mod nearest;
 mod norms;
 mod outcome;
 mod plot;
 mod propose;
+#[cfg(test)]
+mod replay;
 mod search;
 mod store;
 mod table;
@@ -212,7 +216,7 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
     for (knob, _) in reversed {
         let key = &knob.key;
         crate::say!(
-            "note: the first value of `{key}` counts as the best, as it takes longer than the last; if it is not, give them in the other order"
+            "note: the first value of `{key}` counts as the best, as its result is larger than the last's or takes longer; if it is not, give them in the other order"
         );
     }
     let mut outcome = Outcome {
@@ -234,6 +238,9 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
     };
     outcome.judge();
     write(args, &paths, &outcome, &bytes, &graph, &fixed)?;
+    if outcome.pick.is_none() {
+        earlier_tuned(args, &paths.tuned, outcome.goal, interrupted)?;
+    }
     if interrupted {
         return Err(Failure::new(
             Exit::Interrupted,
@@ -323,6 +330,27 @@ fn write(
     }
     if !args.quiet {
         wrote.into_iter().for_each(|path| crate::say!("wrote {}", path.display()));
+    }
+    Ok(())
+}
+
+/// A tuned graph that an earlier study wrote under the same name: removed where this one found no setting good enough, as it
+/// would be taken for this study's; else it is said whose it is.
+fn earlier_tuned(args: &StudyArgs, path: &Path, goal: Goal, interrupted: bool) -> Result<(), Failure> {
+    let Ok(text) = std::fs::read(path) else { return Ok(()) };
+    let shown = path.display();
+    let is_own = String::from_utf8_lossy(&text).contains(tune::MARK);
+    if goal == Goal::None || interrupted || !is_own {
+        if !args.quiet {
+            crate::say!("note: `{shown}` is not of this study; it was there before");
+        }
+        return Ok(());
+    }
+    let failed =
+        |error| Failure::new(Exit::File, format!("`{shown}`, of an earlier study, cannot be removed: {error}"));
+    std::fs::remove_file(path).map_err(failed)?;
+    if !args.quiet {
+        crate::say!("removed `{shown}`, which was of an earlier study");
     }
     Ok(())
 }
