@@ -47,7 +47,7 @@ pub struct StudyArgs {
     /// The graph file; - reads it from stdin
     graph: PathBuf,
     /// A param and the values to compare, from coarse to fine: wind.rotation_steps=4,8,16; repeatable. The last value counts as
-    /// the best, unless the node declares the other direction or the times show it. Runs are compared with a reference one
+    /// the best, unless the node declares the other direction or its results show it. Runs are compared with a reference one
     /// step beyond the best, or with an exact method where the node has one. Without knobs, the graph's are listed
     #[arg(long = "knob", value_name = "NODE.PARAM=V,V,…")]
     knobs: Vec<KnobArg>,
@@ -73,7 +73,7 @@ pub struct StudyArgs {
     /// commas: --norm surface,p99
     #[arg(long, value_name = "NORM", value_delimiter = ',', default_value = "points,mean")]
     norm: Vec<String>,
-    /// Write the graph with the cheapest values whose error is at most this, in the norm's unit
+    /// Write the graph with the cheapest values (in CPU time) whose error is at most this, in the norm's unit
     #[arg(long, value_name = "E", value_parser = positive, conflicts_with = "budget")]
     tolerance: Option<f64>,
     /// Write the graph with the most accurate values that take at most this per frame: 20ms, 1.5s
@@ -88,7 +88,8 @@ pub struct StudyArgs {
     /// Override a param (node.param=VALUE) or a control (name=VALUE) in all runs; repeatable
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Setting>,
-    /// Cook each setting this many times, one after the other in rounds, and take the least time [default: 3, fewer where a run takes seconds]
+    /// Cook each setting this many times, one after the other in rounds, and take the least time; of a search only those that may be
+    /// its pick [default: 3, fewer where a run takes seconds]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeats: Option<u32>,
     /// Do not use the runs that NAME.study has

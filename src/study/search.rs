@@ -53,7 +53,7 @@ pub(super) struct Point {
 pub(super) type Measured<'a> = &'a mut dyn FnMut(&[usize]) -> Result<Option<Point>, Stop>;
 
 /// Settings of a grid up to which all are predicted.
-const MOST_PREDICTED: usize = 1 << 20;
+const MOST_PREDICTED: usize = 1 << 15;
 
 /// The least gain that is worth another cook: the share of the time, or of the error, that it is expected to save.
 const LEAST_GAIN: f64 = 0.01;

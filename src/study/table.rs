@@ -68,7 +68,9 @@ pub(super) fn text(outcome: &Outcome) -> String {
                 Goal::None => String::new(),
             };
             let ms = outcome.ms(pick).map(brief).unwrap_or_default();
-            let _ = writeln!(text, "pick: run {pick}, {of}: {statistic} {error}{unit}, {ms} ms a frame");
+            let cpu = outcome.runs[pick].cost().map(|cost| brief(cost.cpu_ms)).unwrap_or_default();
+            let _ =
+                writeln!(text, "pick: run {pick}, {of}: {statistic} {error}{unit}, {ms} ms a frame, CPU time {cpu} ms");
         }
         (None, Goal::None) => {}
         (None, _) => {

@@ -130,7 +130,7 @@ impl Sweep<'_, '_, '_> {
                 });
                 let Some(most) = most else { continue };
                 let (name, mask) = (specs[*param].name, params[*param].mask().map_or("", |mask| mask));
-                let (range, [low, high]) = (specs[*param].facts.hard, most.ends.map(|end| end as f32));
+                let (range, [low, high]) = (specs[*param].facts.hard, most.ends.map(|end| end as f32 + 0.0));
                 let text = format!(
                     "`{id}` ({}): {} of {} values of `{name}`, masked by `{mask}`, are outside of its range ({range}): \
                      they go from {low} to {high}",
