@@ -20,6 +20,10 @@ pub(super) const REPEATS: u32 = 3;
 /// Without `--repeats`, a setting is cooked again while all its cooks take less than this, in milliseconds.
 pub(super) const LONG: f64 = 6e3;
 
+/// About how many settings a search cooks, and how many of them again.
+const SEARCHED: usize = 8;
+const NEAR_PICK: usize = 2;
+
 /// What the knobs need besides: key, setting, and the knob's key.
 pub(super) fn needs(knobs: &[Knob], graph: &Graph) -> Vec<(String, String, String)> {
     let is_knob = |key: &str| knobs.iter().any(|knob| knob.key == key);
@@ -29,9 +33,17 @@ pub(super) fn needs(knobs: &[Knob], graph: &Graph) -> Vec<(String, String, Strin
     needs
 }
 
-/// The most cooks that a study takes, for the progress.
+/// About how many cooks a study takes, for the progress.
 pub(super) fn planned_runs(knobs: &[Knob], goal: Goal, repeats: u32) -> usize {
-    1 + search::grid_size(knobs, goal).unwrap_or(search::MOST_RUNS) * repeats as usize
+    let repeats = repeats as usize;
+    let along_each = || 1 + knobs.iter().map(Knob::best).sum::<usize>();
+    let cooks = match (search::grid_size(knobs, goal), goal) {
+        (Some(size), _) => size * repeats,
+        (None, Goal::None) => along_each().min(search::MOST_RUNS) * repeats,
+        (None, _) => SEARCHED + NEAR_PICK * (repeats - 1),
+    };
+    // And the reference.
+    1 + cooks
 }
 
 /// A study in progress.
