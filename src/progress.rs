@@ -43,7 +43,12 @@ impl Progress {
     pub fn add(&self, frames: u64) {
         match self {
             Self::Quiet => {}
-            Self::Bar(bar) => bar.inc(frames),
+            Self::Bar(bar) => {
+                bar.inc(frames);
+                if bar.length().is_some_and(|length| length < bar.position()) {
+                    bar.set_length(bar.position());
+                }
+            }
             Self::Lines(lines) => _ = lines.cooked.fetch_add(frames, Ordering::Relaxed),
         }
     }
@@ -90,8 +95,9 @@ impl Drop for Lines {
     }
 }
 
-/// `12 of 48 frames in 10 seconds, about 30 seconds left`.
+/// `12 of 48 frames in 10 seconds, about 30 seconds left`. More frames than were expected count as all of them.
 fn line(cooked: u64, frames: u64, elapsed: Duration) -> String {
+    let frames = frames.max(cooked);
     let left = match cooked {
         0 => String::new(),
         _ => {
@@ -112,6 +118,7 @@ mod tests {
         assert_eq!(line(0, 48, seconds(10)), "0 of 48 frames in 10 seconds");
         assert_eq!(line(12, 48, seconds(10)), "12 of 48 frames in 10 seconds, about 30 seconds left");
         assert_eq!(line(48, 48, seconds(300)), "48 of 48 frames in 5 minutes, about 0 seconds left");
+        assert_eq!(line(50, 48, seconds(300)), "50 of 50 frames in 5 minutes, about 0 seconds left");
     }
 
     #[test]

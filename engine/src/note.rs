@@ -23,6 +23,8 @@ pub mod kind {
     pub const EMPTY_OUTPUT: &str = "empty_output";
     /// A mask that is 0 everywhere, at all frames.
     pub const ZERO_MASK: &str = "zero_mask";
+    /// A mask that takes a param out of its range.
+    pub const MASK_OUTSIDE_RANGE: &str = "mask_outside_range";
     /// An attribute that an output requests and never has.
     pub const MISSING_ATTRIBUTE: &str = "missing_attribute";
     /// An attribute that a node does not read, because its owner or type differs.

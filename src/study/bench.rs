@@ -54,10 +54,20 @@ pub(super) struct Cost {
     pub(super) ms: f64,
     pub(super) cpu_ms: f64,
     pub(super) peak_bytes: usize,
-    /// Wall time by node, in the order of the graph.
-    pub(super) nodes: Vec<(String, f64)>,
+    /// By node, in the order of the graph.
+    pub(super) nodes: Vec<NodeCost>,
     /// How many times it was cooked.
     pub(super) repeats: u32,
+}
+
+/// What a node takes of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct NodeCost {
+    pub(super) id: String,
+    pub(super) ms: f64,
+    pub(super) cpu_ms: f64,
+    /// Greatest size of the arrays that one result added: the same in each run.
+    pub(super) bytes: usize,
 }
 
 impl Cost {
@@ -65,8 +75,9 @@ impl Cost {
     fn at_least(&mut self, other: &Self) {
         self.ms = self.ms.min(other.ms);
         self.cpu_ms = self.cpu_ms.min(other.cpu_ms);
-        for ((_, ms), (_, again)) in self.nodes.iter_mut().zip(&other.nodes) {
-            *ms = ms.min(*again);
+        for (node, again) in self.nodes.iter_mut().zip(&other.nodes) {
+            node.ms = node.ms.min(again.ms);
+            node.cpu_ms = node.cpu_ms.min(again.cpu_ms);
         }
         self.repeats += 1;
     }
@@ -197,7 +208,8 @@ impl Subject<'_> {
             |place: usize| graph.nodes[place].inputs().iter().all(Vec::is_empty) && !report.nodes[place].varies;
         let node = |(place, node): (usize, &engine::cook::NodeReport)| {
             let id = node.id.as_ref()?.to_string();
-            node.needed.then(|| (id, if is_loaded(place) { 0.0 } else { ms(node.wall) }))
+            let [wall, cpu] = [node.wall, node.cpu].map(|time| if is_loaded(place) { 0.0 } else { ms(time) });
+            node.needed.then_some(NodeCost { id, ms: wall, cpu_ms: cpu, bytes: node.peak_bytes })
         };
         Cost {
             ms: ms(report.cooking),

@@ -1,14 +1,16 @@
 //! The course of a study: the reference, the runs, their repetitions.
 
+use std::cell::Cell;
 use std::path::Path;
 
 use engine::graph::Graph;
 
-use super::bench::{Cooked, Reference, Run, Stop, Subject, set_of};
+use super::bench::{Cooked, Cost, Reference, Run, Stop, Subject, set_of};
+use super::direction::{self, End};
 use super::knobs::Knob;
-use super::norms::{Errors, Measure};
+use super::norms::{Errors, Measure, Statistic};
 use super::outcome::Goal;
-use super::search;
+use super::search::{self, Point, Target};
 use super::store::{Store, Stored};
 use crate::failure::Failure;
 
@@ -16,14 +18,11 @@ use crate::failure::Failure;
 pub(super) const REPEATS: u32 = 3;
 
 /// Without `--repeats`, a setting is cooked again while all its cooks take less than this, in milliseconds.
-const LONG: f64 = 6e3;
+pub(super) const LONG: f64 = 6e3;
 
-/// The first value of a knob costs this many times the last, in CPU time of its node, where the values are taken to be given
-/// from fine to coarse.
-const REVERSED: f64 = 1.5;
-
-/// Times shorter than this, in milliseconds a frame, say nothing about the order of values.
-const NOISE: f64 = 0.2;
+/// About how many settings a search cooks, and how many of them again.
+const SEARCHED: usize = 8;
+const NEAR_PICK: usize = 2;
 
 /// What the knobs need besides: key, setting, and the knob's key.
 pub(super) fn needs(knobs: &[Knob], graph: &Graph) -> Vec<(String, String, String)> {
@@ -34,9 +33,17 @@ pub(super) fn needs(knobs: &[Knob], graph: &Graph) -> Vec<(String, String, Strin
     needs
 }
 
-/// The most cooks that a study takes, for the progress.
+/// About how many cooks a study takes, for the progress.
 pub(super) fn planned_runs(knobs: &[Knob], goal: Goal, repeats: u32) -> usize {
-    1 + search::grid_size(knobs, goal).unwrap_or(search::MOST_RUNS) * repeats as usize
+    let repeats = repeats as usize;
+    let along_each = || 1 + knobs.iter().map(Knob::best).sum::<usize>();
+    let cooks = match (search::grid_size(knobs, goal), goal) {
+        (Some(size), _) => size * repeats,
+        (None, Goal::None) => along_each().min(search::MOST_RUNS) * repeats,
+        (None, _) => SEARCHED + NEAR_PICK * (repeats - 1),
+    };
+    // And the reference.
+    1 + cooks
 }
 
 /// A study in progress.
@@ -111,54 +118,111 @@ impl<'a> Study<'a> {
     }
 
     fn all_runs(&mut self) -> Result<(), Stop> {
-        self.settings()?;
-        let reversed: Vec<bool> = (0..self.knobs.len()).map(|place| self.is_reversed(place)).collect();
+        // First, because it gives the floor.
+        self.once(&search::best(&self.knobs))?;
+        let reversed = self.reversed()?;
         if reversed.contains(&true) {
             // All errors were measured against the wrong end.
             self.reverse(&reversed);
-            self.stored = Stored { reversed, ..Stored::default() };
+            let all = self.stored.reversed.iter().zip(&reversed).map(|(before, now)| before | now).collect();
+            self.stored = Stored { reversed: all, ..Stored::default() };
             self.reference = None;
-            self.settings()?;
         }
-        let most = self.repeats.unwrap_or(REPEATS);
-        for round in 1..most {
+        self.settings()?;
+        let is_searched = search::grid_size(&self.knobs, self.goal).is_none();
+        for round in 1..self.repeats.unwrap_or(REPEATS) {
             for place in 0..self.stored.runs.len() {
-                let frames = self.subject.request.frames.len() as f64;
-                let run = &mut self.stored.runs[place];
-                let Some(cost) = run.cost() else { continue };
-                let is_long = self.repeats.is_none() && cost.ms * frames * f64::from(cost.repeats) > LONG;
-                if cost.repeats > round || is_long {
-                    continue;
+                // A search asks for one setting: the times of those that it may be.
+                let runs = &self.stored.runs;
+                if !is_searched || self.goal.is_near(runs, place, self.statistic(), self.floor()) {
+                    self.again(place, round)?;
                 }
-                self.subject.repeat(&self.knobs, run)?;
-                self.store.save(&self.stored, false)?;
             }
         }
         Ok(())
     }
 
+    /// Cooks a run that has no more than `round` cooks once more, unless that takes long and was not asked for.
+    fn again(&mut self, place: usize, round: u32) -> Result<(), Stop> {
+        let frames = self.subject.request.frames.len() as f64;
+        let run = &mut self.stored.runs[place];
+        let Some(cost) = run.cost() else { return Ok(()) };
+        let is_long = self.repeats.is_none() && cost.ms * frames * f64::from(cost.repeats) > LONG;
+        if cost.repeats <= round && !is_long {
+            self.subject.repeat(&self.knobs, run)?;
+            self.store.save(&self.stored, false)?;
+        }
+        Ok(())
+    }
+
+    /// Which of the knobs that were not reversed yet had their values given from fine to coarse.
+    fn reversed(&mut self) -> Result<Vec<bool>, Stop> {
+        let best = search::best(&self.knobs);
+        let mut reversed = vec![false; self.knobs.len()];
+        for place in 0..self.knobs.len() {
+            let knob = &self.knobs[place];
+            let is_known = knob.accuracy.is_some() || knob.numbers().is_none() || self.stored.reversed[place];
+            if is_known || knob.values.len() < 2 {
+                continue;
+            }
+            let mut first = best.clone();
+            first[place] = 0;
+            self.once(&first)?;
+            let Some([fine, coarse]) = self.ends(place, &first) else { continue };
+            reversed[place] = match direction::is_reversed(&fine, &coarse) {
+                Some(is_reversed) => is_reversed,
+                None => {
+                    for round in 1..self.repeats.unwrap_or(REPEATS) {
+                        for setting in [&first, &best] {
+                            if let Some(run) = self.stored.runs.iter().position(|run| run.setting == *setting) {
+                                self.again(run, round)?;
+                            }
+                        }
+                    }
+                    self.ends(place, &first).is_some_and(|[first, last]| direction::takes_longer(&first, &last))
+                }
+            };
+        }
+        Ok(reversed)
+    }
+
+    /// What the runs of a knob's first and last value show, `first` and the best.
+    fn ends(&self, place: usize, first: &[usize]) -> Option<[End; 2]> {
+        let best = search::best(&self.knobs);
+        let end = |setting: &[usize]| {
+            let run = self.stored.runs.iter().find(|run| run.setting == setting)?;
+            End::of(run, &self.knobs[place].node, self.stored.is_beyond)
+        };
+        Some([end(first)?, end(&best)?])
+    }
+
+    fn statistic(&self) -> Statistic {
+        self.subject.norm.statistic
+    }
+
+    /// The floor of the statistic that counts; 0 where it is unknown.
+    fn floor(&self) -> f64 {
+        self.stored.floor.map_or(0.0, |floor| floor.get(self.statistic()))
+    }
+
     /// Cooks each setting once.
     fn settings(&mut self) -> Result<(), Stop> {
         let best = search::best(&self.knobs);
-        // First, because it gives the floor.
         self.once(&best)?;
         let knobs = self.knobs.clone();
         if search::grid_size(&knobs, self.goal).is_some() {
             return search::grid(&knobs).iter().try_for_each(|setting| self.once(setting).map(|_| ()));
         }
-        let floor = |study: &Self| study.stored.floor.map_or(0.0, |floor| floor.get(study.subject.norm.statistic));
-        let (goal, floor) = (self.goal, floor(self));
-        let score = move |error: f64, ms: f64| match goal {
-            Goal::Tolerance(tolerance) => [(error.max(floor) - tolerance).max(0.0), ms],
-            Goal::Budget(budget) => [(ms - budget).max(0.0), error.max(floor)],
-            Goal::None => [f64::INFINITY; 2],
-        };
+        let (goal, statistic) = (self.goal, self.statistic());
+        let floor = Cell::new(self.floor());
         let mut measure = |setting: &[usize]| {
-            let statistic = self.subject.norm.statistic;
             let run = self.once(setting)?;
-            Ok(run.result.as_ref().ok().map(|(cost, errors)| (errors.get(statistic), cost.ms)))
+            let point = |(cost, errors): &(Cost, Errors)| Point { error: errors.get(statistic), ms: goal.time(cost) };
+            let point = run.result.as_ref().ok().map(point);
+            floor.set(self.floor());
+            Ok(point)
         };
-        search::search(&knobs, &score, &mut measure)
+        search::search(&knobs, &|| Target { goal, floor: floor.get() }, &mut measure)
     }
 
     /// The run of a setting, cooked unless it was already.
@@ -266,26 +330,6 @@ impl<'a> Study<'a> {
         self.stored.why = format!("none: no setting could be cooked ({last})");
         self.reference = Some(Reference::default());
         Ok(())
-    }
-
-    /// Whether times show that a numeric knob's values were given from fine to coarse.
-    fn is_reversed(&self, place: usize) -> bool {
-        let knob = &self.knobs[place];
-        if knob.accuracy.is_some() || knob.numbers().is_none() || self.stored.reversed[place] {
-            return false;
-        }
-        let best = search::best(&self.knobs);
-        let time_of = |value: usize| {
-            let mut setting = best.clone();
-            setting[place] = value;
-            let run = self.stored.runs.iter().find(|run| run.setting == setting)?;
-            let node = run.cost()?.nodes.iter().find(|(id, _)| *id == knob.node)?;
-            Some(node.1)
-        };
-        match (time_of(0), time_of(knob.best())) {
-            (Some(first), Some(last)) => first > NOISE && first >= REVERSED * last,
-            _ => false,
-        }
     }
 
     /// Writes the runs, and returns them in the order of the grid.

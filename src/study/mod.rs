@@ -4,14 +4,18 @@
 //! with one reference, beyond the best of them; how far the best is from it is the floor, below which nothing is claimed.
 
 mod bench;
+mod direction;
 mod extremes;
 mod knobs;
 mod measure;
+mod model;
 mod nearest;
 mod norms;
 mod outcome;
 mod plot;
 mod propose;
+#[cfg(test)]
+mod replay;
 mod search;
 mod store;
 mod table;
@@ -43,7 +47,7 @@ pub struct StudyArgs {
     /// The graph file; - reads it from stdin
     graph: PathBuf,
     /// A param and the values to compare, from coarse to fine: wind.rotation_steps=4,8,16; repeatable. The last value counts as
-    /// the best, unless the node declares the other direction or the times show it. Runs are compared with a reference one
+    /// the best, unless the node declares the other direction or its results show it. Runs are compared with a reference one
     /// step beyond the best, or with an exact method where the node has one. Without knobs, the graph's are listed
     #[arg(long = "knob", value_name = "NODE.PARAM=V,V,…")]
     knobs: Vec<KnobArg>,
@@ -69,7 +73,7 @@ pub struct StudyArgs {
     /// commas: --norm surface,p99
     #[arg(long, value_name = "NORM", value_delimiter = ',', default_value = "points,mean")]
     norm: Vec<String>,
-    /// Write the graph with the cheapest values whose error is at most this, in the norm's unit
+    /// Write the graph with the cheapest values (in CPU time) whose error is at most this, in the norm's unit
     #[arg(long, value_name = "E", value_parser = positive, conflicts_with = "budget")]
     tolerance: Option<f64>,
     /// Write the graph with the most accurate values that take at most this per frame: 20ms, 1.5s
@@ -84,7 +88,8 @@ pub struct StudyArgs {
     /// Override a param (node.param=VALUE) or a control (name=VALUE) in all runs; repeatable
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Setting>,
-    /// Cook each setting this many times, one after the other in rounds, and take the least time [default: 3, fewer where a run takes seconds]
+    /// Cook each setting this many times, one after the other in rounds, and take the least time; of a search only those that may be
+    /// its pick [default: 3, fewer where a run takes seconds]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeats: Option<u32>,
     /// Do not use the runs that NAME.study has
@@ -212,7 +217,7 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
     for (knob, _) in reversed {
         let key = &knob.key;
         crate::say!(
-            "note: the first value of `{key}` counts as the best, as it takes longer than the last; if it is not, give them in the other order"
+            "note: the first value of `{key}` counts as the best, as its result is larger than the last's or takes longer; if it is not, give them in the other order"
         );
     }
     let mut outcome = Outcome {
@@ -234,6 +239,9 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
     };
     outcome.judge();
     write(args, &paths, &outcome, &bytes, &graph, &fixed)?;
+    if outcome.pick.is_none() {
+        earlier_tuned(args, &paths.tuned, outcome.goal, interrupted)?;
+    }
     if interrupted {
         return Err(Failure::new(
             Exit::Interrupted,
@@ -327,6 +335,27 @@ fn write(
     }
     if !args.quiet {
         wrote.into_iter().for_each(|path| crate::say!("wrote {}", path.display()));
+    }
+    Ok(())
+}
+
+/// A tuned graph that an earlier study wrote under the same name: removed where this one found no setting good enough, as it
+/// would be taken for this study's; else it is said whose it is.
+fn earlier_tuned(args: &StudyArgs, path: &Path, goal: Goal, interrupted: bool) -> Result<(), Failure> {
+    let Ok(text) = std::fs::read(path) else { return Ok(()) };
+    let shown = path.display();
+    let is_own = String::from_utf8_lossy(&text).contains(tune::MARK);
+    if goal == Goal::None || interrupted || !is_own {
+        if !args.quiet {
+            crate::say!("note: `{shown}` is not of this study; it was there before");
+        }
+        return Ok(());
+    }
+    let failed =
+        |error| Failure::new(Exit::File, format!("`{shown}`, of an earlier study, cannot be removed: {error}"));
+    std::fs::remove_file(path).map_err(failed)?;
+    if !args.quiet {
+        crate::say!("removed `{shown}`, which was of an earlier study");
     }
     Ok(())
 }

@@ -2,9 +2,9 @@
 
 use serde_json::{Map, Value, json};
 
-use super::bench::{Run, set_of};
+use super::bench::{Cost, Run, set_of};
 use super::knobs::{self, Knob};
-use super::norms::{Errors, Norm};
+use super::norms::{Errors, Norm, Statistic};
 
 /// What the pick is to satisfy.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,6 +15,40 @@ pub(super) enum Goal {
     Budget(f64),
     None,
 }
+
+impl Goal {
+    /// The time by which settings are ranked, in milliseconds a frame: that of all processors for the cheapest, which other
+    /// work on the machine lengthens least; that of the clock for a budget.
+    pub(super) fn time(self, cost: &Cost) -> f64 {
+        if matches!(self, Self::Tolerance(_)) { cost.cpu_ms } else { cost.ms }
+    }
+
+    /// Whether a run may be the one that is asked for, once times are known better.
+    pub(super) fn is_near(self, runs: &[Run], place: usize, statistic: Statistic, floor: f64) -> bool {
+        const NEAR: f64 = 1.5;
+        let point = |run: &Run| {
+            let (cost, errors) = run.result.as_ref().ok()?;
+            Some((errors.get(statistic).max(floor), self.time(cost)))
+        };
+        let Some((error, time)) = point(&runs[place]) else { return false };
+        let done = runs.iter().filter_map(point);
+        match self {
+            Self::Tolerance(tolerance) => {
+                let within = done.filter(|(error, _)| *error <= tolerance).map(|(_, time)| time);
+                error <= tolerance && time <= NEAR * within.fold(f64::INFINITY, f64::min)
+            }
+            Self::Budget(budget) => {
+                let within = done.filter(|(_, time)| *time <= budget).map(|(error, _)| error);
+                time <= NEAR * budget && error <= within.fold(f64::INFINITY, f64::min)
+            }
+            Self::None => true,
+        }
+    }
+}
+
+/// Of settings that take up to this many times as long as the cheapest, the most accurate is picked: times are not known
+/// better, errors are.
+const AS_CHEAP: f64 = 1.1;
 
 /// A finished study, or one that was interrupted.
 pub(super) struct Outcome {
@@ -94,7 +128,13 @@ impl Outcome {
             |a: &&(usize, f64, f64), b: &&(usize, f64, f64)| a.2.total_cmp(&b.2).then(a.1.total_cmp(&b.1));
         self.pick = match self.goal {
             Goal::Tolerance(tolerance) if self.floor.is_some() && tolerance < floor => None,
-            Goal::Tolerance(tolerance) => done.iter().find(|(_, _, error)| *error <= tolerance).map(|one| one.0),
+            Goal::Tolerance(tolerance) => {
+                let time = |run: usize| self.runs[run].cost().map_or(f64::INFINITY, |cost| self.goal.time(cost));
+                let within: Vec<_> = done.iter().filter(|(_, _, error)| *error <= tolerance).collect();
+                let least = within.iter().map(|one| time(one.0)).fold(f64::INFINITY, f64::min);
+                let as_cheap = within.into_iter().filter(|one| time(one.0) <= AS_CHEAP * least);
+                as_cheap.min_by(|a, b| a.2.total_cmp(&b.2).then(a.0.cmp(&b.0))).map(|one| one.0)
+            }
             Goal::Budget(budget) => {
                 done.iter().filter(|(_, ms, _)| *ms <= budget).min_by(most_accurate).map(|one| one.0)
             }
@@ -177,7 +217,7 @@ impl Outcome {
             Ok((cost, errors)) => json!({
                 "settings": self.settings(run), "error": errors.to_json(), "ms": cost.ms, "cpu_ms": cost.cpu_ms,
                 "peak_bytes": cost.peak_bytes,
-                "nodes": cost.nodes.iter().map(|(id, ms)| (id.clone(), json!(ms))).collect::<Map<String, Value>>(),
+                "nodes": cost.nodes.iter().map(|node| (node.id.clone(), json!(node.ms))).collect::<Map<String, Value>>(),
                 "failed": null,
             }),
             Err(why) => json!({

@@ -2,6 +2,7 @@
 
 use super::bench::Stop;
 use super::knobs::Knob;
+use super::model::{Axis, Law, Model};
 use super::outcome::Goal;
 
 /// A grid with more settings is searched instead.
@@ -33,73 +34,125 @@ pub(super) fn grid(knobs: &[Knob]) -> Vec<Vec<usize>> {
     })
 }
 
-/// How bad an error and a time are; the search looks for the least. Compared in order.
-pub(super) type Score<'a> = &'a dyn Fn(f64, f64) -> [f64; 2];
+/// What the search looks for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Target {
+    pub(super) goal: Goal,
+    /// Errors below it count as it.
+    pub(super) floor: f64,
+}
 
-/// Measures a setting: its error and time, `None` where it failed.
-pub(super) type Measured<'a> = &'a mut dyn FnMut(&[usize]) -> Result<Option<(f64, f64)>, Stop>;
+/// Error and time of a setting.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Point {
+    pub(super) error: f64,
+    pub(super) ms: f64,
+}
+
+/// Measures a setting; `None` where it failed.
+pub(super) type Measured<'a> = &'a mut dyn FnMut(&[usize]) -> Result<Option<Point>, Stop>;
 
 /// Settings of a grid up to which all are predicted.
-const MOST_PREDICTED: usize = 1 << 20;
+const MOST_PREDICTED: usize = 1 << 15;
 
-/// Predicted settings that are tried in a row without finding a better one.
-const MOST_IN_VAIN: usize = 6;
+/// The least gain that is worth another cook: the share of the time, or of the error, that it is expected to save.
+const LEAST_GAIN: f64 = 0.01;
 
-/// Searches a grid: first along each knob with the others at their best, then the settings that these runs predict to be
-/// best, one after the other. The prediction adds what each knob adds to the error, and multiplies by what it changes of the
-/// time.
-pub(super) fn search(knobs: &[Knob], score: Score<'_>, measure: Measured<'_>) -> Result<(), Stop> {
+/// The same as a share of its price: what it adds to the time of all cooks so far.
+const LEAST_OF_PRICE: f64 = 0.05;
+
+/// Which share of its price is taken from the gain of a cook, to choose between several.
+const PRICE: f64 = 2.0;
+
+/// Searches a grid for the cheapest setting within a tolerance, or the most accurate within a budget. The best setting is
+/// cooked for the floor, the coarsest because it may do, and then one after the other the setting of which most is expected:
+/// the chance that it meets the goal times what it would save. The search ends where no setting is worth a cook. Without a
+/// goal it goes along each knob with the others at their best.
+pub(super) fn search(knobs: &[Knob], target: &dyn Fn() -> Target, measure: Measured<'_>) -> Result<(), Stop> {
     let best = best(knobs);
-    let Some(at_best) = measure(&best)? else { return Ok(()) };
-    let mut left = MOST_RUNS - 1;
-    let mut along = Vec::new();
-    for (place, knob) in knobs.iter().enumerate() {
-        let mut of_knob = vec![None; knob.values.len()];
-        of_knob[knob.best()] = Some(at_best);
-        for value in (0..knob.best()).rev().take(left.min(knob.best())) {
-            let mut setting = best.clone();
-            setting[place] = value;
-            of_knob[value] = measure(&setting)?;
-            left -= 1;
-        }
-        along.push(of_knob);
+    let mut cooked = vec![(best.clone(), measure(&best)?)];
+    let Target { goal, floor } = target();
+    if goal == Goal::None {
+        return along_each(knobs, &best, measure);
     }
-    let predicted = |setting: &[usize]| -> Option<(f64, f64)> {
-        let mut sum = at_best;
-        for (of_knob, value) in along.iter().zip(setting) {
-            let (error, ms) = of_knob[*value]?;
-            sum = (sum.0 + error - at_best.0, sum.1 * ms / at_best.1);
-        }
-        Some((sum.0.max(0.0), sum.1))
-    };
-    let product = knobs.iter().try_fold(1_usize, |product, knob| product.checked_mul(knob.values.len()));
-    if product.is_none_or(|product| product > MOST_PREDICTED) {
+    if matches!(goal, Goal::Tolerance(tolerance) if tolerance < floor) {
+        // Nothing can be claimed, whatever is cooked.
         return Ok(());
     }
-    let is_known = |setting: &[usize]| setting.iter().zip(&best).filter(|(value, best)| value != best).count() < 2;
-    let mut candidates: Vec<([f64; 2], Vec<usize>)> = grid(knobs)
-        .into_iter()
-        .filter(|setting| !is_known(setting))
-        .filter_map(|setting| predicted(&setting).map(|(error, ms)| (score(error, ms), setting)))
-        .collect();
-    let order = |a: &[f64; 2], b: &[f64; 2]| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]));
-    candidates.sort_by(|a, b| order(&a.0, &b.0));
-    let known = along.iter().flatten().flatten().map(|(error, ms)| score(*error, *ms));
-    let mut least = known.min_by(order).unwrap_or([f64::INFINITY; 2]);
-    let mut in_vain = 0;
-    for (expected, setting) in candidates.into_iter().take(left) {
-        if order(&expected, &least).is_ge() || in_vain == MOST_IN_VAIN {
-            break;
-        }
-        in_vain += 1;
-        if let Some((error, ms)) = measure(&setting)? {
-            let found = score(error, ms);
-            if order(&found, &least).is_lt() {
-                (least, in_vain) = (found, 0);
-            }
+    let product = knobs.iter().try_fold(1_usize, |product, knob| product.checked_mul(knob.values.len()));
+    if product.is_none_or(|product| product > MOST_PREDICTED) {
+        return along_each(knobs, &best, measure);
+    }
+    let axes: Vec<Axis> = knobs.iter().map(Axis::of).collect();
+    let grid = grid(knobs);
+    let mut next = Some(vec![0; knobs.len()]);
+    while let Some(setting) = next.filter(|_| cooked.len() < MOST_RUNS) {
+        let found = measure(&setting)?;
+        cooked.push((setting, found));
+        next = most_promising(&grid, &axes, &cooked, target());
+    }
+    Ok(())
+}
+
+/// Measures the values of each knob with the others at their best, finest first.
+fn along_each(knobs: &[Knob], best: &[usize], measure: Measured<'_>) -> Result<(), Stop> {
+    let mut left = MOST_RUNS - 1;
+    for (place, knob) in knobs.iter().enumerate() {
+        for value in (0..knob.best()).rev().take(left.min(knob.best())) {
+            let mut setting = best.to_vec();
+            setting[place] = value;
+            measure(&setting)?;
+            left -= 1;
         }
     }
     Ok(())
+}
+
+/// The setting whose cook is expected to gain most; `None` if none is worth it.
+fn most_promising(
+    grid: &[Vec<usize>],
+    axes: &[Axis],
+    cooked: &[(Vec<usize>, Option<Point>)],
+    Target { goal, floor }: Target,
+) -> Option<Vec<usize>> {
+    let done: Vec<(&[usize], Point)> =
+        cooked.iter().filter_map(|(setting, point)| Some((&setting[..], (*point)?))).collect();
+    // A logarithm needs a positive number.
+    let number = |law: Law, point: &Point| match law {
+        Law::Error => point.error.max(floor).max(f64::MIN_POSITIVE),
+        Law::Time => point.ms.max(f64::MIN_POSITIVE),
+    };
+    let fitted = |law: Law| {
+        let numbers = done.iter().map(|(setting, point)| (*setting, number(law, point)));
+        Model::fit(law, axes, &numbers.collect::<Vec<_>>())
+    };
+    let (errors, times) = (fitted(Law::Error), fitted(Law::Time));
+    let (bounded, most, saves, least) = match goal {
+        Goal::Tolerance(tolerance) => (Law::Error, tolerance, Law::Time, 0.0),
+        Goal::Budget(budget) => (Law::Time, budget, Law::Error, floor),
+        Goal::None => return None,
+    };
+    let expected = |law: Law, setting: &[usize]| match law {
+        Law::Error => errors.expected(setting),
+        Law::Time => times.expected(setting),
+    };
+    let meets = |point: &Point| number(bounded, point) <= most;
+    let found = done.iter().filter(|(_, point)| meets(point)).map(|(_, point)| number(saves, point));
+    let found = found.fold(f64::INFINITY, f64::min);
+    let gain = |setting: &[usize]| {
+        let chance = expected(bounded, setting).is_at_most(most);
+        // All of it where nothing was found.
+        let saved = if found.is_finite() { 1.0 - expected(saves, setting).number().max(least) / found } else { 1.0 };
+        chance * saved
+    };
+    let spent: f64 = done.iter().map(|(_, point)| point.ms).sum();
+    let untried = grid.iter().filter(|setting| cooked.iter().all(|(known, _)| known != *setting));
+    let worth = |setting: &Vec<usize>| {
+        let (gain, price) = (gain(setting), times.expected(setting).number() / spent);
+        (gain >= LEAST_GAIN.max(LEAST_OF_PRICE * price)).then_some(gain - PRICE * price)
+    };
+    let worthy = untried.filter_map(|setting| Some((worth(setting)?, setting)));
+    worthy.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, setting)| setting.clone())
 }
 
 #[cfg(test)]
@@ -133,9 +186,10 @@ mod tests {
         let mut measure = |setting: &[usize]| {
             measured.push(setting.to_vec());
             let [a, b] = [setting[0] as f64 + 1.0, setting[1] as f64 + 1.0];
-            Ok(Some((1.0 / (a * a) + 0.25 / (b * b), a * b)))
+            Ok(Some(Point { error: 1.0 / (a * a) + 0.25 / (b * b), ms: a * b }))
         };
-        search(&knobs, &|error, ms| [(error - 0.07).max(0.0), ms], &mut measure).unwrap();
-        assert!(measured.contains(&vec![4, 2]) && measured.len() < 25, "{measured:?}");
+        let target = || Target { goal: Goal::Tolerance(0.07), floor: 0.0 };
+        search(&knobs, &target, &mut measure).unwrap();
+        assert!(measured.contains(&vec![4, 2]) && measured.len() < 16, "{measured:?}");
     }
 }

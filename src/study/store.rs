@@ -10,12 +10,15 @@ use engine::graph::Graph;
 use engine::key::{ContentKey, Hasher};
 use serde_json::{Value, json};
 
-use super::bench::{Cost, Run, Subject};
+use super::bench::{Cost, NodeCost, Run, Subject};
 use super::knobs::Knob;
 use super::norms::Errors;
 use crate::CATALOGUE;
 use crate::failure::Failure;
 use crate::output::write_whole;
+
+/// The format of the file; one of another is measured anew.
+const FORMAT: u32 = 2;
 
 /// The runs are written no more often than this, in seconds.
 const INTERVAL: f64 = 1.0;
@@ -49,7 +52,7 @@ impl Store {
     /// The runs in the file, if there are any of this study.
     pub(super) fn load(&self) -> Option<Stored> {
         let value: Value = serde_json::from_slice(&std::fs::read(&self.path).ok()?).ok()?;
-        (value["convect_study"] == 1 && value["key"] == self.key.to_string()).then_some(())?;
+        (value["convect_study"] == FORMAT && value["key"] == self.key.to_string()).then_some(())?;
         let pair = |pair: &Value| Some((pair[0].as_str()?.to_owned(), pair[1].as_str()?.to_owned()));
         Some(Stored {
             runs: value["runs"].as_array()?.iter().map(run_of).collect::<Option<_>>()?,
@@ -71,7 +74,7 @@ impl Store {
             return Ok(());
         }
         let value = json!({
-            "convect_study": 1, "key": self.key.to_string(), "reversed": stored.reversed,
+            "convect_study": FORMAT, "key": self.key.to_string(), "reversed": stored.reversed,
             "floor": stored.floor.map(Errors::to_json), "reference": stored.reference, "why": stored.why,
             "is_beyond": stored.is_beyond, "rounding": stored.rounding, "runs": stored.runs.iter().map(run_to_json).collect::<Vec<_>>(),
         });
@@ -112,7 +115,8 @@ fn run_to_json(run: &Run) -> Value {
     match &run.result {
         Ok((cost, errors)) => json!({
             "setting": run.setting, "error": errors.to_json(), "ms": cost.ms, "cpu_ms": cost.cpu_ms,
-            "peak_bytes": cost.peak_bytes, "nodes": cost.nodes, "repeats": cost.repeats,
+            "peak_bytes": cost.peak_bytes, "repeats": cost.repeats,
+            "nodes": cost.nodes.iter().map(|node| json!([node.id, node.ms, node.cpu_ms, node.bytes])).collect::<Vec<_>>(),
         }),
         Err(why) => json!({"setting": run.setting, "failed": why}),
     }
@@ -124,7 +128,14 @@ fn run_of(value: &Value) -> Option<Run> {
     if let Some(why) = value["failed"].as_str() {
         return Some(Run { setting, result: Err(why.to_owned()) });
     }
-    let node = |pair: &Value| Some((pair[0].as_str()?.to_owned(), pair[1].as_f64()?));
+    let node = |node: &Value| {
+        Some(NodeCost {
+            id: node[0].as_str()?.to_owned(),
+            ms: node[1].as_f64()?,
+            cpu_ms: node[2].as_f64()?,
+            bytes: node[3].as_u64()? as usize,
+        })
+    };
     let cost = Cost {
         ms: value["ms"].as_f64()?,
         cpu_ms: value["cpu_ms"].as_f64()?,

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use engine::memory::size_text;
 
+use super::bench::NodeCost;
 use super::outcome::{Goal, Outcome};
 use super::search;
 use crate::numbers::short;
@@ -67,7 +68,9 @@ pub(super) fn text(outcome: &Outcome) -> String {
                 Goal::None => String::new(),
             };
             let ms = outcome.ms(pick).map(brief).unwrap_or_default();
-            let _ = writeln!(text, "pick: run {pick}, {of}: {statistic} {error}{unit}, {ms} ms a frame");
+            let cpu = outcome.runs[pick].cost().map(|cost| brief(cost.cpu_ms)).unwrap_or_default();
+            let _ =
+                writeln!(text, "pick: run {pick}, {of}: {statistic} {error}{unit}, {ms} ms a frame, CPU time {cpu} ms");
         }
         (None, Goal::None) => {}
         (None, _) => {
@@ -143,11 +146,12 @@ fn sources(outcome: &Outcome, text: &mut String) {
     const SHARE: f64 = 0.03;
     let shown = outcome.pick.or_else(|| outcome.most_accurate());
     if let Some((run, cost)) = shown.and_then(|run| Some((run, outcome.runs[run].cost()?))) {
-        let all: f64 = cost.nodes.iter().map(|(_, ms)| ms).sum();
-        let mut nodes: Vec<&(String, f64)> =
-            cost.nodes.iter().filter(|(_, ms)| *ms >= SHARE * all && *ms > 0.0).collect();
-        nodes.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let shares: Vec<String> = nodes.iter().map(|(id, ms)| format!("{id} {:.0} %", ms / all * 100.0)).collect();
+        let all: f64 = cost.nodes.iter().map(|node| node.ms).sum();
+        let mut nodes: Vec<&NodeCost> =
+            cost.nodes.iter().filter(|node| node.ms >= SHARE * all && node.ms > 0.0).collect();
+        nodes.sort_by(|a, b| b.ms.total_cmp(&a.ms));
+        let shares: Vec<String> =
+            nodes.iter().map(|node| format!("{} {:.0} %", node.id, node.ms / all * 100.0)).collect();
         if !shares.is_empty() {
             let _ = writeln!(text, "time of run {run}: {}", shares.join(", "));
         }

@@ -17,6 +17,9 @@ use super::knobs;
 use super::outcome::{Goal, Outcome};
 use super::table::{brief, shown_error};
 
+/// What the comment beside a picked value begins with.
+pub(super) const MARK: &str = "convect study:";
+
 /// A range of the text and what replaces it.
 struct Edit {
     start: usize,
@@ -70,7 +73,7 @@ fn why(outcome: &Outcome, pick: usize) -> String {
         Goal::None => "picked".into(),
     };
     let ms = outcome.ms(pick).map(brief).unwrap_or_default();
-    format!("convect study: {goal}: {statistic} {measure} error {error}{unit}, floor {floor}, {ms} ms a frame")
+    format!("{MARK} {goal}: {statistic} {measure} error {error}{unit}, floor {floor}, {ms} ms a frame")
 }
 
 /// A param or control with its value and comment.

@@ -180,6 +180,37 @@ fn a_mask_that_is_zero_everywhere_is_noted() {
     assert!(ran.stderr.starts_with("misspelt.json:5:"), "{}", ran.stderr);
 }
 
+#[test]
+fn a_mask_that_leaves_the_range_of_its_param_is_noted_once() {
+    let graph = |code: &str, param: &str| {
+        Bench::with_graph(&format!(
+            r#"{{"convect": 1, "scene": {{"frames": [1, 3]}}, "nodes": {{
+                "two": {{"type": "Curve_In", "params": {{"points": [[0, 0, 0], [0, 1, 0], [0, 2, 0]], "width": 0.1}}}},
+                "mask": {{"type": "Attribute_Expr", "inputs": {{"geometry": "two"}}, "params": {{"code": "m = {code}"}}}},
+                "wind": {{"type": "Curve_Wind", "inputs": {{"curves": "mask"}},
+                    "params": {{"{param}": {{"value": 0.5, "attribute": "m"}}}}}}
+            }}, "outputs": {{"o": "wind"}}}}"#
+        ))
+    };
+    // Half of −1, 2 and 5; at frame 1 nothing is outside.
+    let expected = "`wind` (Curve_Wind): 2 of 3 values of `blend`, masked by `m`, are outside of its range (0…1): they go \
+                    from -0.5 to 2.5 (frames 2-3). They are clamped to the range. The values are `value` times the \
+                    attribute: look at where `m` is made.";
+    let bench = graph("frame < 2 ? 1 : P.y*3 - 1", "blend");
+    for _ in 0..2 {
+        assert_eq!(notes(&bench, &["--cache", "cache"]), [expected], "from the cache too");
+    }
+    let below = notes(&graph("-P.y", "amplitude"), &[]);
+    assert!(below.len() == 1 && below[0].contains("2 of 3 values of `amplitude`"), "{below:?}");
+    assert!(
+        below[0].contains("(at least 0): they go from -1 to 0") && below[0].contains("would be refused"),
+        "{below:?}"
+    );
+    // A factor that rounding makes a little larger than 2, and a param without a range.
+    assert_eq!(notes(&graph("2.0000001", "blend"), &[]), [""; 0]);
+    assert_eq!(notes(&graph("-9", "waviness"), &[]), [""; 0]);
+}
+
 /// Whole numbers and numbers per curve are masks too, and frames from the cache count as those that are cooked.
 #[test]
 fn masks_of_any_kind_are_noted_from_the_cache_too() {

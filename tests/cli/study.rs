@@ -256,6 +256,29 @@ fn a_tolerance_below_the_floor_or_out_of_reach_is_not_claimed() {
 }
 
 #[test]
+fn a_tuned_graph_of_an_earlier_study_does_not_stay_beside_one_that_found_none() {
+    let bench = Bench::with_graph(WALL);
+    let run = |more: &[&str]| bench.run(&[&["study", "g.json", "--knob", STEPS, "--repeats", "1"], more].concat());
+    let tuned = bench.path("out/grass.tuned.jsonc");
+    assert_eq!(run(&["--tolerance", "4e-3"]).code, Some(0));
+    assert!(tuned.exists());
+    let plain = run(&[]);
+    assert!(
+        plain.stderr.contains("note: `out/grass.tuned.jsonc` is not of this study") && tuned.exists(),
+        "{}",
+        plain.stderr
+    );
+    let none = run(&["--tolerance", "1e-5"]);
+    assert_eq!(none.code, Some(4));
+    assert!(none.stderr.contains("removed `out/grass.tuned.jsonc`, which was of an earlier study"), "{}", none.stderr);
+    assert!(!tuned.exists());
+    // A file that no study wrote is left alone.
+    bench.write("out/grass.tuned.jsonc", WALL);
+    let none = run(&["--tolerance", "1e-5"]);
+    assert!(none.stderr.contains("is not of this study; it was there before") && tuned.exists(), "{}", none.stderr);
+}
+
+#[test]
 fn wrong_names_are_refused_with_what_was_meant() {
     let bench = Bench::with_graph(&WALL.replace("\"grass\": \"bent\"", "\"grass\": \"bent\", \"still\": \"put\""));
     let refused = |code: i32, args: &[&str], text: &str| {
@@ -323,15 +346,24 @@ fn several_knobs_make_a_grid_and_a_large_one_is_searched() {
     let (a, b) = (format!("bent.rotation_steps={steps}"), "bent.gap=5e-4,4e-4,3e-4,2e-4,1e-4");
     let searched = study(&bench, &["--knob", &a, "--knob", b, "--frames", "1", "--tolerance", "1"]);
     let runs = searched["runs"].as_array().unwrap().len();
-    assert!((17..64).contains(&runs) && searched["pick"].is_number(), "{runs} runs");
+    // The best and the coarsest, which is within so wide a tolerance.
+    assert!((2..6).contains(&runs) && searched["pick"].is_number(), "{runs} runs");
     let args = ["study", "g.json", "--knob", &a, "--knob", b, "--frames", "1", "--repeats", "1", "--quiet", "--fresh"];
     assert!(bench.done(&args).contains("a search: 17 of 65 settings were cooked"));
-    // With a tolerance that only the best steps meet, a small grid is searched, too: its two lines alone.
+    // With a tolerance that only the best steps meet, a small grid is searched, too.
     let steps = study(&bench, &["--knob", STEPS, "--knob", "bent.gap=1e-4"]);
     let error = |run: usize| steps["runs"][run]["error"]["mean"].as_f64().unwrap();
     let between = (error(2) * error(3)).sqrt().to_string();
     let found = study(&bench, &["--knob", STEPS, "--knob", "bent.gap=5e-4,3e-4,1e-4", "--tolerance", &between]);
-    assert_eq!(found["runs"].as_array().unwrap().len(), 6, "{found}");
+    let runs = found["runs"].as_array().unwrap();
+    let pick = &runs[found["pick"].as_u64().unwrap() as usize];
+    assert!(runs.len() < 8 && pick["error"]["mean"].as_f64().unwrap() <= between.parse().unwrap(), "{found}");
+    assert_eq!(pick["settings"]["bent.rotation_steps"], json!(32));
+    // Below the floor nothing can be claimed: what gives the floor is cooked, and the first value of the undeclared `gap`.
+    let below = ["--knob", STEPS, "--knob", "bent.gap=5e-4,3e-4,1e-4", "--tolerance", "1e-12", "--json", "below.json"];
+    let ran = bench.run(&[&["study", "g.json", "--repeats", "1", "--quiet", "--fresh"], &below[..]].concat());
+    assert!(ran.code == Some(4) && ran.stderr.contains("is below the floor"), "{}", ran.stderr);
+    assert_eq!(bench.read_json("below.json")["runs"].as_array().unwrap().len(), 2);
 }
 
 /// The order of the errors e of curves with 2, 4 and 8 segments, against one of 32: e = C·|h² − 32⁻²|.

@@ -84,7 +84,10 @@ impl Cx<'_> {
             Some(found) => format!("which is {found}"),
             None => format!("which the {kind} do not have"),
         };
-        let hint = point_float_hint(part, &attribute);
+        let hint = match part.describe(&attribute) {
+            Some(_) => point_float_hint(part, &attribute),
+            None => missing_mask_hint(part, &attribute),
+        };
         let fact = format!("`{name}` is masked by `{attribute}`, {what}");
         Err(Error::refused(fact).hint(hint).of(name).of_types())
     }
@@ -176,6 +179,18 @@ impl Cx<'_> {
 pub fn point_float_hint(part: &Component, name: &str) -> String {
     let expected = || format!("expected {}", part.kind().rows_text(Owner::Point, ColumnType::F1));
     point_hint(part, name, |kind| kind == ColumnType::F1, expected)
+}
+
+/// What a mask that is missing may be: the name that is nearest, else those that there are.
+fn missing_mask_hint(part: &Component, name: &str) -> String {
+    let make = || {
+        let numbers = part.table(Owner::Point).iter().filter(|(_, column)| column.kind() == ColumnType::F1);
+        let names: Vec<String> = numbers.map(|(name, _)| format!("`{name}`")).collect();
+        let rows = part.kind().rows_text(Owner::Point, ColumnType::F1);
+        let make = format!("make `{name}` before this node, {rows}, with Attribute_Expr for example");
+        if names.is_empty() { make } else { format!("they have {}; {make}", names.join(", ")) }
+    };
+    point_hint(part, name, |kind| kind == ColumnType::F1, make)
 }
 
 /// As [`point_float_hint`], where the attribute may have one, three or four floats a point.

@@ -63,6 +63,8 @@ struct Row {
     outcome: Outcome,
     message: String,
     probed: Probed,
+    /// Whether the param is read, and so was cooked.
+    is_read: bool,
 }
 
 /// The frames and outputs that are cooked: the first frames of the scene unless `--frames` says which.
@@ -136,7 +138,7 @@ pub(super) fn run(args: &StudyArgs) -> Result<(), Failure> {
         }
         let mut row = row(&end.key, &end.value, ended, &as_it_is, limit);
         if !end.is_read {
-            row.outcome = Outcome::Finite;
+            (row.outcome, row.is_read) = (Outcome::Finite, false);
             row.message = "not read: the other params leave it out".into();
         }
         print(args, &shown(&end.key, &end.value), width, &row)?;
@@ -208,7 +210,7 @@ fn row(key: &str, value: &str, ended: Ended, as_it_is: &Probed, limit: Duration)
             (outcome, message, probed)
         }
     };
-    Row { key: key.into(), value: value.into(), outcome, message, probed }
+    Row { key: key.into(), value: value.into(), outcome, message, probed, is_read: true }
 }
 
 fn figures(probed: &Probed) -> String {
@@ -235,7 +237,8 @@ fn shown(key: &str, value: &str) -> String {
 
 fn print(args: &StudyArgs, what: &str, width: usize, row: &Row) -> Result<(), Failure> {
     let message = row.message.replace('\n', " ");
-    let line = format!("{what:<width$}  {:<7}  {message}", row.outcome.name());
+    let outcome = if row.is_read { row.outcome.name() } else { "-" };
+    let line = format!("{what:<width$}  {outcome:<7}  {message}");
     match args.json.as_ref().is_some_and(|path| is_stdout(path)) {
         true => crate::say!("{line}"),
         false => std::io::stdout().write_all(format!("{line}\n").as_bytes())?,
@@ -280,10 +283,14 @@ fn interrupted(rows: usize) -> Failure {
 }
 
 fn verdict(args: &StudyArgs, rows: &[Row]) -> Result<(), Failure> {
-    let count = |outcome: Outcome| rows.iter().filter(|row| row.outcome == outcome).count();
+    let count = |outcome: Outcome| rows.iter().filter(|row| row.outcome == outcome && row.is_read).count();
     if !args.quiet {
+        let unread = match rows.iter().filter(|row| !row.is_read).count() {
+            0 => String::new(),
+            unread => format!(", {unread} not read"),
+        };
         crate::say!(
-            "{} values: {} finite, {} refused, {} capped",
+            "{} values: {} finite, {} refused, {} capped{unread}",
             rows.len(),
             count(Outcome::Finite),
             count(Outcome::Refused),

@@ -138,7 +138,8 @@ fn probed(report: &Report, graph: &Graph, request: &Request, largest: f32) -> Pr
     let trouble = |note: &Note| Trouble {
         node: note.node.as_deref().unwrap_or_default().to_owned(),
         metric: note.kind.to_owned(),
-        text: note.text.clone(),
+        // What the figure means, too.
+        text: note.hint.as_ref().map_or_else(|| note.text.clone(), |hint| format!("{}. {hint}", note.text)),
     };
     Probed {
         frames,

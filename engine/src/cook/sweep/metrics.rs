@@ -1,15 +1,16 @@
 //! Metrics: what nodes publish goes into the report, and is kept on disk with each finished frame.
 
 use super::Sweep;
+use super::masks::MaskFigures;
 use crate::cook::disk::KeptMetric;
 use crate::graph::Body;
 use crate::key::ContentKey;
 use crate::note::Note;
 use crate::time::Frame;
 
-/// What the name of a kept number begins with that says whether the mask of a param is 0; its index follows. No metric has
-/// a blank in its name.
-const ZERO_MASK: &str = "zero mask ";
+/// What the name of a kept number begins with that is about the mask of a param; the param's index and the number's follow.
+/// No metric has a blank in its name.
+const MASK: &str = "mask ";
 
 impl Sweep<'_, '_, '_> {
     /// Adds what a node published at a frame to the report. What is not a number that a file can hold is left out, and a
@@ -35,19 +36,24 @@ impl Sweep<'_, '_, '_> {
         metrics.iter().filter_map(|(name, values)| Some((*name, *values.get(&frame)?))).collect()
     }
 
-    /// Whether there is anything to keep with a node's results: metrics, or where its masks are 0.
+    /// Whether there is anything to keep with a node's results: metrics, or what its masks are.
     pub(super) fn measures(&self, node: usize) -> bool {
         let node = &self.plan.graph.nodes[node];
         let is_masked = || matches!(&node.body, Body::Node { params, .. } if params.iter().any(|p| p.mask().is_some()));
         node.node().is_some_and(|declared| !declared.metrics.is_empty()) || is_masked()
     }
 
-    /// What is kept with a result of a node: its metrics, and which of its masks are 0.
+    /// What is kept with a result of a node: its metrics, and what its masks are.
     pub(super) fn kept_of(&self, node: usize, frame: Frame, key: ContentKey) -> impl Iterator<Item = KeptMetric> {
         let metrics = self.published(node, frame).into_iter().map(|(name, value)| (name.to_owned(), value));
-        let masks = self.nodes[node].zero_masks.iter();
-        let masks = masks.filter_map(|(param, frames)| Some((format!("{ZERO_MASK}{param}"), *frames.get(&frame)?)));
-        let masks: Vec<_> = masks.collect();
+        let masks = self.nodes[node].masks.iter();
+        let masks = masks.filter_map(|(param, frames)| Some((*param, frames.get(&frame)?.numbers())));
+        let masks: Vec<_> = masks
+            .flat_map(|(param, numbers)| {
+                let named = move |(index, number)| (format!("{MASK}{param} {index}"), number);
+                numbers.into_iter().enumerate().map(named)
+            })
+            .collect();
         metrics.chain(masks).map(move |(name, value)| (key, name, value))
     }
 
@@ -84,8 +90,10 @@ impl Sweep<'_, '_, '_> {
         let declared = self.plan.graph.nodes[node].node().map_or(&[][..], |declared| declared.metrics);
         let of_key = || kept.iter().filter(|(of, _, _)| *of == key);
         for (_, name, value) in of_key() {
-            if let Some(param) = name.strip_prefix(ZERO_MASK).and_then(|param| param.parse().ok()) {
-                self.nodes[node].zero_masks.entry(param).or_default().insert(at, *value);
+            let indices = name.strip_prefix(MASK).and_then(|rest| rest.split_once(' '));
+            if let Some((Ok(param), Ok(index))) = indices.map(|(param, index)| (param.parse(), index.parse())) {
+                let frames = self.nodes[node].masks.entry(param).or_default();
+                frames.entry(at).or_insert(MaskFigures::NONE).set_number(index, *value);
             }
         }
         let metrics: Vec<(&'static str, f64)> = of_key()

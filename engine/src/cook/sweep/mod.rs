@@ -7,6 +7,7 @@ mod chains;
 mod demand;
 mod executor;
 mod jumps;
+mod masks;
 mod metrics;
 mod nodes;
 mod notes;
@@ -36,7 +37,8 @@ use crate::time::Frame;
 use demand::Lookahead;
 pub(super) use executor::Executor;
 use jumps::Jumps;
-use notes::{Observed, ZeroMasks};
+use masks::Masks;
+use notes::Observed;
 use results::OnDisk;
 
 /// A result, or the error that spoiled it.
@@ -87,7 +89,7 @@ struct NodeRun<'p> {
     call_time: Duration,
     /// Key of the result that is kept because later frames may have the same.
     held: Option<ContentKey>,
-    zero_masks: ZeroMasks,
+    masks: Masks,
     /// Metrics that were not finite at some frame.
     left_out_metrics: BTreeSet<&'static str>,
     jumps: Jumps,
@@ -134,7 +136,7 @@ impl<'p> NodeRun<'p> {
             on_disk: OnDisk::default(),
             call_time: Duration::MAX,
             held: None,
-            zero_masks: ZeroMasks::new(),
+            masks: Masks::new(),
             left_out_metrics: BTreeSet::new(),
             jumps: Jumps::default(),
             report: NodeReport {
@@ -224,6 +226,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         self.note_missing_attributes();
         self.note_empty_outputs();
         self.note_zero_masks();
+        self.note_masks_outside();
         self.report_jumps();
         self.note_warnings();
         let window = |(index, run): (usize, NodeRun<'_>)| NodeReport { window: self.keys.window(index), ..run.report };

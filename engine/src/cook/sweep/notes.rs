@@ -1,12 +1,11 @@
-//! Notes of a cook: attributes that are missing, differ from what a node reads or mask everything; outputs without
-//! geometry; frames outside the scene. They are not errors, but a wrong picture might otherwise go unnoticed.
+//! Notes of a cook: attributes that are missing or differ from what a node reads; outputs without geometry; frames outside the scene. They are not errors, but a wrong picture might otherwise go unnoticed.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Sweep;
 use crate::cook::{Delivered, warnings};
 use crate::expr::suggest::nearest;
-use crate::geometry::{Component, Geometry, Name, Owner, P, V};
+use crate::geometry::{Name, Owner, P, V};
 use crate::graph::Body;
 use crate::node::Needs;
 use crate::note::{Note, kind};
@@ -25,9 +24,6 @@ pub(super) struct Observed {
     /// By output: frames without geometry; `None` once there was one with geometry.
     empty: BTreeMap<usize, Option<Vec<Frame>>>,
 }
-
-/// At which frames the masks of a node are 0 everywhere, by the index of their params: 1 there, 0 elsewhere.
-pub(super) type ZeroMasks = BTreeMap<usize, BTreeMap<Frame, f64>>;
 
 impl Observed {
     pub(super) fn of(plan: &Plan<'_>) -> Self {
@@ -65,16 +61,6 @@ impl Observed {
     }
 }
 
-/// Whether a mask is 0 everywhere, whatever a mask may be stored as; `None` where there is none, or no row of it.
-fn is_zero(geometry: &Geometry, mask: &str) -> Option<bool> {
-    let owners = |part| [Owner::Point, Owner::Element].map(|owner| Component::table(part, owner));
-    let tables: Vec<_> = geometry.parts().flat_map(owners).collect();
-    let floats = tables.iter().filter_map(|table| table.get::<f32>(mask)).filter(|rows| !rows.is_empty());
-    let wholes = tables.iter().filter_map(|table| table.get::<i32>(mask)).filter(|rows| !rows.is_empty());
-    let floats = floats.map(|rows| rows.iter().all(|factor| *factor == 0.0));
-    floats.chain(wholes.map(|rows| rows.iter().all(|factor| *factor == 0))).reduce(|a, b| a && b)
-}
-
 impl Sweep<'_, '_, '_> {
     /// Notes frames of the request that are not in the scene.
     pub(super) fn note_frames_outside(&mut self) {
@@ -105,38 +91,6 @@ impl Sweep<'_, '_, '_> {
             let text = format!("output `{}` has no geometry at any frame", output.name);
             let hint = format!("Look at what `{}` ({}) returns, and what it is given.", from.id, from.type_name());
             self.report.notes.push(Note::new(kind::EMPTY_OUTPUT, text).of_node(&from.id).at(frames).hint(hint));
-        }
-    }
-
-    /// Records at which of some frames the masks of a node's params are 0 everywhere.
-    pub(super) fn record_masks(&mut self, node: usize, frames: &BTreeSet<Frame>) {
-        let plan = self.plan;
-        let Body::Node { params, inputs, .. } = &plan.graph.nodes[node].body else { return };
-        let masks = params.iter().enumerate().filter_map(|(param, source)| Some((param, source.mask()?)));
-        for (param, mask) in masks {
-            for frame in frames {
-                let reads = inputs.iter().flatten().map(|link| plan.read(*link, *frame));
-                let cooked = reads.filter_map(|read| self.geometry(read).ok());
-                let zero = cooked.filter_map(|geometry| is_zero(&geometry, mask)).reduce(|a, b| a && b);
-                if let Some(zero) = zero {
-                    self.nodes[node].zero_masks.entry(param).or_default().insert(*frame, f64::from(u8::from(zero)));
-                }
-            }
-        }
-    }
-
-    /// Notes masks that were 0 everywhere at all frames.
-    pub(super) fn note_zero_masks(&mut self) {
-        for (node, run) in self.plan.graph.nodes.iter().zip(&self.nodes) {
-            let (Body::Node { params, specs, .. }, id) = (&node.body, &node.id) else { continue };
-            let always = |frames: &BTreeMap<Frame, f64>| frames.values().all(|zero| *zero == 1.0);
-            for (param, frames) in run.zero_masks.iter().filter(|(_, frames)| always(frames)) {
-                let (name, mask) = (specs[*param].name, params[*param].mask().map_or("", |mask| mask));
-                let text = format!("`{id}` ({}): the mask `{mask}` of `{name}` is 0 everywhere", node.type_name());
-                let hint = format!("`{name}` has no effect. Look at where the attribute `{mask}` is made.");
-                let frames = frames.keys().copied().collect();
-                self.report.notes.push(Note::new(kind::ZERO_MASK, text).of_node(id).at(frames).hint(hint));
-            }
         }
     }
 

@@ -187,7 +187,12 @@ impl<'a> Reader<'a, '_> {
             }
         };
         if !accepts(spec.shape, form.name, within) {
-            let fault = form.fault(code::PARAM_FORM, format!("`{}` cannot be set by `{}`", spec.name, form.name));
+            let is_mask = form.name == "value" && find(entries, "attribute").is_some();
+            let fact = match is_mask {
+                true => format!("`{}` cannot be masked by an attribute", spec.name),
+                false => format!("`{}` cannot be set by `{}`", spec.name, form.name),
+            };
+            let fault = form.fault(code::PARAM_FORM, fact);
             self.faults.push(match spec.shape {
                 Shape::File => fault.hint("expected a path, in which `####` is replaced by the frame number"),
                 shape => fault.hint(format!("expected {}", shape.describe())),
