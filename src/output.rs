@@ -41,6 +41,13 @@ impl Written {
     pub fn name<'g>(&self, graph: &'g Graph) -> &'g str {
         self.outputs.first().map_or("", |output| graph.outputs[*output].file())
     }
+
+    /// Forgets what would be in a file that is not written.
+    fn forget(&mut self) {
+        self.frames.clear();
+        self.lost.clear();
+        self.without_width.clear();
+    }
 }
 
 enum Target {
@@ -92,7 +99,8 @@ impl<'g> Writers<'g> {
         let (graph, folder, format) = (self.graph, &self.folder, self.format);
         for (target, written) in &mut self.files {
             let outputs = &written.outputs;
-            let mine: Vec<&Delivered> = finished.iter().filter(|one| outputs.contains(&one.output)).collect();
+            let mine: Vec<&Delivered> =
+                finished.iter().filter(|one| outputs.binary_search(&one.output).is_ok()).collect();
             // A frame that one of the outputs lacks is not written: the file will not be, either.
             let whole = mine.chunk_by(|a, b| a.frame == b.frame).filter(|frame| frame.len() == outputs.len());
             if let Target::Nothing = target {
@@ -150,7 +158,7 @@ impl<'g> Writers<'g> {
             if let Target::Sequence { writer: Some(mut writer), .. } = target {
                 let are_of = |some: &[usize]| written.outputs.iter().any(|output| some.contains(output));
                 if are_of(incomplete) {
-                    written.frames.clear();
+                    written.forget();
                 } else {
                     if are_of(sampled) {
                         writer.sample_all();
@@ -161,9 +169,7 @@ impl<'g> Writers<'g> {
                             written.bytes = summary.bytes;
                         }
                         Err(failure) => {
-                            written.frames.clear();
-                            written.lost.clear();
-                            written.without_width.clear();
+                            written.forget();
                             failed.get_or_insert(Failure { lines: Vec::new(), ..failure }).lines.extend(failure.lines);
                         }
                     }

@@ -277,8 +277,10 @@ struct Paths {
 
 impl Paths {
     fn new(args: &StudyArgs, name: &str) -> Self {
+        // Of several outputs in one file each has its own study.
+        let name = name.replace('/', ".");
         let file = |ending: &str| args.out.join(format!("{name}.{ending}"));
-        Self { plot: file("svg"), tuned: file("tuned.jsonc"), store: store::path(&args.out, name) }
+        Self { plot: file("svg"), tuned: file("tuned.jsonc"), store: store::path(&args.out, &name) }
     }
 
     /// Refuses to overwrite what is read.

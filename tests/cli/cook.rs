@@ -199,7 +199,7 @@ fn the_report_is_as_documented() {
     bench.done(&[&["cook", "g.json", "--format", "json", "--output", "grass", "--frames", "1-2"], &set[..]].concat());
     let report = bench.read_json("report.json");
     let keys = |value: &serde_json::Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
-    assert_eq!(keys(&report), ["frames", "graph", "nodes", "notes", "outputs", "report", "total"]);
+    assert_eq!(keys(&report), ["frames", "graph", "nodes", "notes", "outputs", "recipe", "report", "total"]);
     assert_eq!((&report["report"], &report["frames"]), (&json!(1), &json!([1, 2])));
     let wind = &report["nodes"]["wind"];
     let documented = ["type", "time", "cooks", "from_cache", "left_out", "wall_ms", "cpu_ms", "peak_bytes", "metrics"];

@@ -426,3 +426,19 @@ fn without_knobs_commands_for_those_of_the_graph_are_printed() {
     let args: Vec<&str> = command.split(' ').skip(1).chain(["--frames", "1", "--repeats", "1", "--quiet"]).collect();
     assert!(bench.done(&args).contains("declared 1"));
 }
+
+#[test]
+fn one_of_several_outputs_in_a_stage_is_studied_by_its_name() {
+    let bench = Bench::with_graph(
+        r#"{"convect": 1, "scene": {"frames": [1, 2]}, "nodes": {
+            "grass": {"type": "Curve_In", "params": {"file": "grass.obj"}},
+            "wind": {"type": "Curve_Wind", "inputs": {"curves": "grass"}}
+        }, "outputs": {"set": ["grass", "wind"]}}"#,
+    );
+    let knob = ["study", "g.json", "--knob", "wind.octaves=1,2", "--output"];
+    let ran = bench.run(&[&knob[..], &["set"]].concat());
+    let line = "`set` has several outputs; write --output with one of `set/grass`, `set/wind`\n";
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(2), line));
+    bench.done(&[&knob[..], &["set/wind"]].concat());
+    assert!(bench.names("out").contains(&"set.wind.svg".to_owned()), "{:?}", bench.names("out"));
+}
