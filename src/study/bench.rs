@@ -15,7 +15,7 @@ use engine::plan::Request;
 use engine::time::Frame;
 
 use super::knobs::{Knob, settings};
-use super::norms::{self, Errors, Measure, Norm};
+use super::norms::{self, Differences, Errors, Measure, Norm};
 use crate::failure::{Exit, Failure};
 use crate::load;
 use crate::progress::Progress;
@@ -239,7 +239,7 @@ impl Subject<'_> {
 
     /// Cooks a setting of the knobs and measures its error.
     pub(super) fn run(&self, knobs: &[Knob], setting: &[usize], reference: &Reference) -> Result<Run, Stop> {
-        let mut differences = Vec::new();
+        let mut differences = Differences::default();
         let measure = &self.norm.measure;
         let mut take = |one: &Delivered| {
             let Some(of_reference) = reference.frames.get(&one.frame) else { return Ok(()) };
@@ -260,7 +260,7 @@ impl Subject<'_> {
                 return Err(Failure::new(Exit::CommandLine, line).into());
             }
             let both = own.iter().filter_map(|(frame, value)| Some(value - reference.metric.get(frame)?));
-            differences = both.map(f64::abs).collect();
+            differences.extend(both.map(f64::abs));
         }
         Ok(match Errors::of(differences) {
             Some(errors) => Run { setting: setting.to_vec(), result: Ok((cost, errors)) },

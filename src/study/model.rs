@@ -60,7 +60,7 @@ impl Law {
     /// How far a number is from its law before any run is near, as a deviation of logarithms.
     fn deviation(self) -> f64 {
         match self {
-            Self::Error => 0.5,
+            Self::Error => 0.6,
             Self::Time => 0.25,
         }
     }

@@ -5,21 +5,26 @@ use engine::geometry::{Component, Topology};
 use numerics::tree::TriangleTree;
 use numerics::vector::{DVec3, to_f64};
 
-use super::norms::element_pairs;
+use super::norms::{Differences, element_pairs};
 
-/// Adds the distances of both ways. Meshes are compared as surfaces, tets by the faces that only one tet has, curves by
+/// Adds the distances of both ways, weighted by area or length. Meshes are compared as surfaces, tets by the faces that only one tet has, curves by
 /// pairs of polylines; points have no surface.
 ///
 /// # Errors
 /// If they have no surface, or one of them is empty.
-pub(super) fn both_ways(a: &Component, b: &Component, into: &mut Vec<f64>) -> Result<(), String> {
+pub(super) fn both_ways(a: &Component, b: &Component, into: &mut Differences) -> Result<(), String> {
     match (a.topology(), b.topology()) {
         (Topology::Curves(of_a), Topology::Curves(of_b)) => {
+            let mut ways = [Vec::new(), Vec::new()];
             for (i, j) in element_pairs(a, b)? {
                 let (p, q) = (&a.positions()[of_a.range(i)], &b.positions()[of_b.range(j)]);
-                into.extend(p.iter().map(|point| to_polyline(to_f64(*point), q)));
-                into.extend(q.iter().map(|point| to_polyline(to_f64(*point), p)));
+                let way = |from: &[[f32; 3]], to: &[[f32; 3]]| -> Vec<(f64, f64)> {
+                    let distances = from.iter().map(|point| to_polyline(to_f64(*point), to));
+                    distances.zip(lengths(from)).collect()
+                };
+                [way(p, q), way(q, p)].into_iter().zip(&mut ways).for_each(|(own, all)| all.extend(own));
             }
+            into.extend_both_ways(ways);
             return Ok(());
         }
         (Topology::Points, _) => {
@@ -34,8 +39,7 @@ pub(super) fn both_ways(a: &Component, b: &Component, into: &mut Vec<f64>) -> Re
     if a.triangles.is_empty() || b.triangles.is_empty() {
         return Err("one of two results has no surface".into());
     }
-    a.to(&b, into);
-    b.to(&a, into);
+    into.extend_both_ways([a.to(&b), b.to(&a)]);
     Ok(())
 }
 
@@ -56,21 +60,29 @@ impl<'a> Surface<'a> {
         Self { positions, tree: TriangleTree::build(positions, &triangles), triangles }
     }
 
-    /// The distance of each of its points to the nearest point of `other`.
-    fn to(&self, other: &Self, into: &mut Vec<f64>) {
+    /// The distance of each of its points to the nearest point of `other`, with a third of the area of the triangles around
+    /// it.
+    fn to(&self, other: &Self) -> Vec<(f64, f64)> {
         let mut used: Vec<u32> = self.triangles.as_flattened().to_vec();
         used.sort_unstable();
         used.dedup();
-        let from: Vec<[f32; 3]> = used.into_iter().map(|point| self.positions[point as usize]).collect();
+        let from: Vec<[f32; 3]> = used.iter().map(|point| self.positions[*point as usize]).collect();
         let found = other.tree.closest_each(&from, f32::INFINITY);
         // The tree finds the triangle in f32; its distance is taken in f64.
-        into.extend(from.iter().zip(found).map(|(point, found)| match found {
+        let each = from.iter().zip(found).map(|(point, found)| match found {
             Some(found) => {
                 let corners = other.triangles[found.triangle as usize];
                 to_triangle(to_f64(*point), corners.map(|corner| to_f64(other.positions[corner as usize])))
             }
             None => f64::NAN,
-        }));
+        });
+        let mut areas = vec![0.0; self.positions.len()];
+        for corners in &self.triangles {
+            let [a, b, c] = corners.map(|corner| to_f64(self.positions[corner as usize]));
+            let third = (b - a).cross(&(c - a)).norm() / 6.0;
+            corners.iter().for_each(|corner| areas[*corner as usize] += third);
+        }
+        each.zip(used.iter().map(|point| areas[*point as usize])).collect()
     }
 }
 
@@ -84,6 +96,17 @@ fn boundary(tets: &[[u32; 4]]) -> Vec<[u32; 3]> {
     let mut faces: Vec<_> = tets.iter().flat_map(|tet| faces_of(*tet)).map(|face| (sorted(face), face)).collect();
     faces.sort_unstable();
     faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).map(|same| same[0].1).collect()
+}
+
+/// Half of the lengths of the segments at each point of a polyline.
+fn lengths(line: &[[f32; 3]]) -> Vec<f64> {
+    let mut lengths = vec![0.0; line.len()];
+    for (index, pair) in line.windows(2).enumerate() {
+        let half = (to_f64(pair[1]) - to_f64(pair[0])).norm() / 2.0;
+        lengths[index] += half;
+        lengths[index + 1] += half;
+    }
+    lengths
 }
 
 /// The distance of a point to a polyline.
@@ -129,8 +152,9 @@ mod tests {
             let faces = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
             Component::mesh(vec![3; 8], faces.concat(), positions).unwrap()
         };
-        let mut found = Vec::new();
+        let mut found = Differences::default();
         both_ways(&octahedron(1.0), &octahedron(2.0), &mut found).unwrap();
+        let found = found.numbers();
         assert_eq!(found.len(), 12);
         assert!(found[..6].iter().all(|x| (x - 1.0 / 3.0_f64.sqrt()).abs() < 1e-12), "{found:?}");
         assert!(found[6..].iter().all(|x| *x == 1.0), "{found:?}");
@@ -142,11 +166,11 @@ mod tests {
             let positions: Vec<[f32; 3]> = cvs.iter().map(|y| [0.0, *y, 0.0]).collect();
             Component::curves(vec![cvs.len() as u32], positions).unwrap()
         };
-        let mut found = Vec::new();
+        let mut found = Differences::default();
         both_ways(&curve(&[0.0, 0.5, 1.0]), &curve(&[0.0, 0.25, 1.0]), &mut found).unwrap();
-        assert_eq!(found, [0.0; 6]);
+        assert_eq!(found.numbers(), [0.0; 6]);
         both_ways(&curve(&[0.0, 1.0]), &curve(&[0.0, 2.0]), &mut found).unwrap();
-        assert_eq!(found[6..], [0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(found.numbers()[6..], [0.0, 0.0, 0.0, 1.0]);
     }
 
     #[test]

@@ -162,12 +162,12 @@ impl Measure {
     ///
     /// # Errors
     /// Why they cannot be compared.
-    pub(super) fn compare(&self, a: &Geometry, b: &Geometry, into: &mut Vec<f64>) -> Result<(), String> {
+    pub(super) fn compare(&self, a: &Geometry, b: &Geometry, into: &mut Differences) -> Result<(), String> {
         match self {
             Self::Points => each_part(a, b, |a, b| points(a, b, into)),
             Self::Surface => each_part(a, b, |a, b| nearest::both_ways(a, b, into)),
             Self::Volume => {
-                into.push((enclosed(a)? - enclosed(b)?).abs());
+                into.extend([(enclosed(a)? - enclosed(b)?).abs()]);
                 Ok(())
             }
             Self::Attribute(name) if name == "P" => each_part(a, b, |a, b| points(a, b, into)),
@@ -194,7 +194,7 @@ fn each_part(
 }
 
 /// Distances of points.
-fn points(a: &Component, b: &Component, into: &mut Vec<f64>) -> Result<(), String> {
+fn points(a: &Component, b: &Component, into: &mut Differences) -> Result<(), String> {
     let (p, q) = (a.positions(), b.positions());
     let distance = |(i, j): (usize, usize)| (to_f64(p[i]) - to_f64(q[j])).norm();
     into.extend(point_pairs(a, b)?.into_iter().map(distance));
@@ -261,7 +261,7 @@ fn matched(a: &[i32], b: &[i32]) -> Result<Option<Vec<(usize, usize)>>, String> 
 }
 
 /// Differences of an attribute: of each row the length of the difference.
-fn attribute(name: &str, a: &Geometry, b: &Geometry, into: &mut Vec<f64>) -> Result<(), String> {
+fn attribute(name: &str, a: &Geometry, b: &Geometry, into: &mut Differences) -> Result<(), String> {
     let mut found = false;
     each_part(a, b, |a, b| {
         for owner in Owner::ALL {
@@ -333,17 +333,54 @@ pub(super) struct Errors {
     pub(super) max: f64,
 }
 
+/// Differences of two results with their weights.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Differences(Vec<(f64, f64)>);
+
+impl Extend<f64> for Differences {
+    /// Adds differences that count the same.
+    fn extend<I: IntoIterator<Item = f64>>(&mut self, numbers: I) {
+        self.0.extend(numbers.into_iter().map(|number| (number, 1.0)));
+    }
+}
+
+impl Differences {
+    /// Adds those of both ways between two shapes, each with the length or area that its point stands for. Both ways together
+    /// weigh 1, each half of that: how finely a shape is cut must not change how much a part of it counts.
+    pub(super) fn extend_both_ways(&mut self, ways: [Vec<(f64, f64)>; 2]) {
+        for way in ways {
+            let size: f64 = way.iter().map(|(_, size)| size).sum();
+            let count = way.len() as f64;
+            let weight = |own: f64| if size > 0.0 { 0.5 * own / size } else { 0.5 / count };
+            self.0.extend(way.into_iter().map(|(number, own)| (number, weight(own))));
+        }
+    }
+
+    /// The differences alone.
+    #[cfg(test)]
+    pub(super) fn numbers(&self) -> Vec<f64> {
+        self.0.iter().map(|(number, _)| *number).collect()
+    }
+}
+
 impl Errors {
-    /// The statistics of `numbers`; `None` if there are none, or one is not finite.
-    pub(super) fn of(mut numbers: Vec<f64>) -> Option<Self> {
-        if numbers.is_empty() || !numbers.iter().all(|x| x.is_finite()) {
+    /// The statistics of differences; `None` if there are none, or one is not finite.
+    pub(super) fn of(Differences(mut rows): Differences) -> Option<Self> {
+        if rows.is_empty() || !rows.iter().all(|(x, _)| x.is_finite()) {
             return None;
         }
-        let mean = numbers.iter().sum::<f64>() / numbers.len() as f64;
-        numbers.sort_unstable_by(f64::total_cmp);
-        // The smallest number that 99 of 100 do not exceed.
-        let rank = (numbers.len() * 99).div_ceil(100);
-        Some(Self { mean, p99: numbers[rank - 1], max: numbers[numbers.len() - 1] })
+        let total: f64 = rows.iter().map(|(_, weight)| weight).sum();
+        let mean = rows.iter().map(|(x, weight)| x * weight).sum::<f64>() / total;
+        rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // The smallest number that 99 of 100 do not exceed, up to the rounding of the sum.
+        let most = 0.99 * total * (1.0 - 1e-12);
+        let mut sum = 0.0;
+        let rank = rows.iter().position(|(_, weight)| {
+            sum += weight;
+            sum >= most
+        });
+        let max = rows[rows.len() - 1].0;
+        Some(Self { mean, p99: rank.map_or(max, |rank| rows[rank].0), max })
     }
 
     pub(super) fn get(&self, statistic: Statistic) -> f64 {
@@ -381,10 +418,33 @@ mod tests {
 
     #[test]
     fn the_99th_percentile_is_one_of_the_numbers() {
-        let errors = Errors::of((1..=200).map(f64::from).collect()).unwrap();
+        let of = |numbers: &[f64]| {
+            let mut differences = Differences::default();
+            differences.extend(numbers.iter().copied());
+            Errors::of(differences)
+        };
+        let errors = of(&(1..=200).map(f64::from).collect::<Vec<_>>()).unwrap();
         assert_eq!(errors, Errors { mean: 100.5, p99: 198.0, max: 200.0 });
-        assert_eq!(Errors::of(vec![2.0]).unwrap(), Errors { mean: 2.0, p99: 2.0, max: 2.0 });
-        assert_eq!((Errors::of(vec![]), Errors::of(vec![f64::NAN])), (None, None));
+        assert_eq!(of(&[2.0]).unwrap(), Errors { mean: 2.0, p99: 2.0, max: 2.0 });
+        assert_eq!((of(&[]), of(&[f64::NAN])), (None, None));
+    }
+
+    #[test]
+    fn how_finely_a_shape_is_cut_does_not_change_how_much_a_part_of_it_counts() {
+        let errors = |fine: usize| {
+            let mut differences = Differences::default();
+            // A tenth of the second shape is 3 away, however finely that is cut.
+            let far = vec![(3.0, 0.1 / fine as f64); fine];
+            differences.extend_both_ways([vec![(1.0, 5.0); 10], [far, vec![(1.0, 0.9)]].concat()]);
+            Errors::of(differences).unwrap()
+        };
+        for fine in [1, 7, 100] {
+            let found = errors(fine);
+            assert!((found.mean - 1.1).abs() < 1e-12 && (found.p99, found.max) == (3.0, 3.0), "{fine}: {found:?}");
+        }
+        let mut flat = Differences::default();
+        flat.extend_both_ways([vec![(1.0, 0.0); 2], vec![(2.0, 0.0)]]);
+        assert_eq!(Errors::of(flat).unwrap().mean, 1.5, "without any size each point counts the same");
     }
 
     #[test]
@@ -396,9 +456,9 @@ mod tests {
         };
         let a = with(&[([0.0; 3], 7), ([1.0, 0.0, 0.0], 9)]);
         let b = with(&[([1.0, 2.0, 0.0], 9), ([5.0; 3], 1), ([0.0; 3], 7)]);
-        let mut found = Vec::new();
+        let mut found = Differences::default();
         Measure::Points.compare(&a, &b, &mut found).unwrap();
-        assert_eq!(found, [0.0, 2.0]);
+        assert_eq!(found.numbers(), [0.0, 2.0]);
         let bare = |count| Geometry::from(Component::points(vec![[0.0; 3]; count]));
         let refused = Measure::Points.compare(&bare(2), &bare(3), &mut found).unwrap_err();
         assert_eq!(refused, "one result has 2 points of the points, another 3");
@@ -425,10 +485,10 @@ mod tests {
             points.set(engine::geometry::V, vec![v]).unwrap();
             Geometry::from(points)
         };
-        let mut found = Vec::new();
+        let mut found = Differences::default();
         let measure = Measure::Attribute("v".into());
         measure.compare(&with([0.0, 3.0, 0.0]), &with([4.0, 0.0, 0.0]), &mut found).unwrap();
-        assert_eq!(found, [5.0]);
+        assert_eq!(found.numbers(), [5.0]);
         let unknown = Measure::Attribute("heat".into()).compare(&with([0.0; 3]), &with([0.0; 3]), &mut found);
         assert_eq!(unknown.unwrap_err(), "the output has no attribute `heat`; see `convect stats` for those it has");
         let mistyped = Measure::Attribute("volum".into()).compare(&with([0.0; 3]), &with([0.0; 3]), &mut found);

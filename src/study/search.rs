@@ -62,7 +62,7 @@ const LEAST_GAIN: f64 = 0.01;
 const LEAST_OF_PRICE: f64 = 0.05;
 
 /// Which share of its price is taken from the gain of a cook, to choose between several.
-const PRICE: f64 = 2.0;
+const PRICE: f64 = 3.0;
 
 /// Searches a grid for the cheapest setting within a tolerance, or the most accurate within a budget. The best setting is
 /// cooked for the floor, the coarsest because it may do, and then one after the other the setting of which most is expected:

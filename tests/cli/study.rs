@@ -186,6 +186,24 @@ fn one_level_finer_moves_no_error_by_more_than_the_floor() {
     assert!(coarse.iter().zip(&fine).all(|(a, b)| (a - b).abs() <= floor), "{coarse:?} {fine:?}");
 }
 
+/// Finer cells give the liquid more vertices, beside those of a table that stays as it is: neither may count for more by that.
+#[test]
+fn one_level_finer_moves_no_error_of_a_surface_by_more_than_the_floor() {
+    let table = r#""nodes": {
+    "table": { "type": "Mesh_Primitive", "params": { "shape": "grid", "size": [2, 0, 2], "divisions": 24 } },
+    "both": { "type": "Merge", "inputs": { "geometry": ["solve.surface", "table"] } },"#;
+    let graph = SLUMP.replace("\"nodes\": {", table).replace("\"drop\": \"solve\"", "\"drop\": \"both\"");
+    let bench = Bench::with_graph(&graph);
+    let means = |values: &str| -> (Vec<f64>, f64) {
+        let found = study(&bench, &["--norm", "surface", "--knob", &format!("solve.cell={values}")]);
+        let mean = |run: &Value| run["error"]["mean"].as_f64().unwrap();
+        (found["runs"].as_array().unwrap().iter().map(mean).collect(), found["floor"]["mean"].as_f64().unwrap())
+    };
+    let ((coarse, floor), (fine, finer)) = (means("0.1,0.07,0.05"), means("0.1,0.07,0.05,0.0357142857"));
+    assert!(floor > 0.0 && finer < floor && coarse[0] > 2.0 * floor, "{coarse:?} {floor} {finer}");
+    assert!(coarse.iter().zip(&fine).all(|(a, b)| (a - b).abs() <= floor), "{coarse:?} {fine:?} {floor}");
+}
+
 #[test]
 fn values_that_are_refused_stay_as_failures() {
     let bench = Bench::with_graph(WALL);
