@@ -118,12 +118,7 @@ impl<'a> HairLanes<'a> {
         for rank in 0..self.how.weights.of(self.first).len() {
             let mut rotation = [F64x16::ZERO, F64x16::ZERO, F64x16::ZERO, F64x16([1.0; LANES])];
             let mut arm = [F64x16::ZERO; 3];
-            let mut share = Share {
-                weight: F64x16::ZERO,
-                matrix: [F64x16::ZERO; 9],
-                at: [0; LANES],
-                end: [0; LANES],
-            };
+            let mut share = Share { weight: F64x16::ZERO, matrix: [F64x16::ZERO; 9], at: [0; LANES], end: [0; LANES] };
             for lane in 0..self.hairs {
                 let guide = &self.how.weights.of(self.first + lane)[rank];
                 if guide.weight <= 0.0 {

@@ -75,8 +75,7 @@ impl LaneTurns {
         let across = cross_side_by_side(axis, &turned);
         for part in 0..3 {
             for lane in 0..LANES {
-                turned[part].0[lane] =
-                    turned[part].0[lane] * w.0[lane] + across[part].0[lane] + vectors[part].0[lane];
+                turned[part].0[lane] = turned[part].0[lane] * w.0[lane] + across[part].0[lane] + vectors[part].0[lane];
             }
         }
         turned
@@ -136,11 +135,8 @@ impl GuideTurns {
         };
         let found = parallel::tabulate(guides, TASK, one);
         let middles = segment_middles(starts, rest);
-        let mut all = Self {
-            starts: vec![0],
-            segments: Vec::with_capacity(rest.len()),
-            offsets: Vec::with_capacity(guides),
-        };
+        let mut all =
+            Self { starts: vec![0], segments: Vec::with_capacity(rest.len()), offsets: Vec::with_capacity(guides) };
         for (turns, offset) in found {
             for turn in turns {
                 all.segments.push(GuideSegment { middle: middles[all.segments.len()], turn });
