@@ -95,7 +95,7 @@ impl ClearLanes {
                     rise = if farther < squares[shell].0[lane] { self.rises[shell].0[lane] } else { rise };
                 }
                 // Not if either is NaN or infinite.
-                let is_finite = height.0[lane] - height.0[lane] == 0.0 && next.0[lane] - next.0[lane] == 0.0;
+                let is_finite = height.0[lane].abs() < f64::INFINITY && next.0[lane].abs() < f64::INFINITY;
                 clear[lane] &= (lower > rise + slack.0[lane]) & is_finite;
             }
             (height, square) = (next, next_square);

@@ -98,7 +98,7 @@ fn half_spaces_change_no_bit() {
     // Sixteen at a time, of fewer CVs on every third lane, and none on the last.
     for first in (0..600).step_by(15) {
         let mut lanes = ClearLanes::none();
-        let cvs = |lane: usize| if lane % 3 == 0 { 3 } else { CVS as usize };
+        let cvs = |lane: usize| if lane.is_multiple_of(3) { 3 } else { CVS as usize };
         for lane in 0..15 {
             let root = of(first + lane).start;
             lanes.put(lane, [root, cvs(lane)], &known[first + lane], &to_f64(rest[root]), 5e-4);
