@@ -27,7 +27,8 @@ fn main() {
         };
         let starts: Vec<u32> = (0..=curves).map(|curve| curve * cvs).collect();
         let groom: Vec<[f32; 3]> = (0..curves).flat_map(|curve| (0..cvs).map(move |k| cv(curve, k))).collect();
-        let shield = Shield { wind: [1.0, 0.2, 0.3], offset: 10.0, distance: 0.0, falloff: 1.0, cone, skin_gap: 0.0 };
+        let shield =
+            Shield { wind: [1.0, 0.2, 0.3], offset: 10.0.into(), distance: 0.0, falloff: 1.0, cone, skin_gap: 0.0 };
         let colliders = [Collider::of(&points, &triangles)];
         print!("{curves:>7} × {cvs:>2}, cone {cone:<3} rad");
         for path in Path::all() {

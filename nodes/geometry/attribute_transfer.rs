@@ -38,7 +38,9 @@ params! { PARAMS:
 const OUT: Output = Output::like("geometry", &GEOMETRY, "The geometry with the attributes.");
 
 metrics! { METRICS:
-    UNREACHED = Metric::new("unreached", Unit::None, "Rows without anything of `source` within `radius`.");
+    UNREACHED = Metric::new("unreached", Unit::None, "Rows without anything of `source` within `radius`.")
+        .warn_above(0.0, "Nothing of `source` is within `radius` of these rows, which keep the values that they have, or neutral \
+            ones. Raise `radius`, or set it to 0 to take the nearest value however far it is.");
 }
 
 pub(crate) static NODE: Node = Node::new(

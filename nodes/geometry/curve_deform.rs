@@ -64,7 +64,14 @@ metrics! { METRICS:
     STARTED_INSIDE = Metric::new("started_inside", Unit::None,
         "Curves that would enter the skin and cross it at rest too, even with their roots lifted out of it: they are turned \
          out of it as far as possible.");
-    UNGUIDED = Metric::new("unguided", Unit::None, "Curves without a guide within `radius`.");
+    UNGUIDED = Metric::new("unguided", Unit::None, "Curves without a guide, or with none within `radius`.")
+        .warn_above(0.0, "These curves follow no guide: they only move with the skin, if one is wired. Raise `radius`, set it to 0 \
+            to let every curve follow its nearest guides, or grow guides near them.");
+    OFF_SKIN = Metric::new("guides_off_skin", Unit::None,
+        "Guides whose roots do not move with the skin: they are farther from where it carries them than half of its way \
+         there, and than a hundredth of their lengths.")
+        .warn_above(0.0, "`skin` moves, but not the roots of these guides, so that the roots of curves leave the skin as theirs \
+            do. Carry the guides along first: put Curve_Attach, with the same `rest_skin` and `skin`, before what bends them.");
     FAR_ROOTS = Metric::new("far_roots", Unit::None,
         "Curves and guides whose roots are farther from the skin at rest than they are long.")
         .warn_above(0.0, "These curves are farther from `rest_skin` than they are long, so they probably grew on another \
@@ -115,7 +122,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     cx.publish(UNGUIDED, bound.unguided as f64);
     cx.publish(FAR_ROOTS, bound.far_roots as f64);
     let skin_rests = skins.is_none_or(|(rest, now)| rest.positions() == now.positions());
-    let (mut kept, mut length_error) = (KeptOut::default(), 0.0);
+    let (mut kept, mut length_error, mut off_skin) = (KeptOut::default(), 0.0, 0);
     if !skin_rests || guides.positions() != rest_guides.positions() {
         let on_skin = match skins {
             Some((_, now)) => now.kept(SameBound(bound.clone()), || Ok(OnSkin::new(&bound, now, skin_rests)))?,
@@ -123,6 +130,9 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         };
         let deformed = deformed(cx, &bound, &on_skin, [rest_guides, guides])?;
         length_error = deformed.length_error;
+        if let (Some(_), Some(poses)) = (skins, on_skin.guides()) {
+            off_skin = roots_off(rest_guides, guides, poses);
+        }
         let mut points = deformed.points;
         if let Some((_, skin)) = skins.filter(|_| cx.get(KEEP_OUT)) {
             let skin = Skin::of(skin);
@@ -138,11 +148,23 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         out.set(P, points)?;
         rotate_attributes(&mut out, on_skin.hairs(), &deformed.rotations);
     }
+    cx.publish(OFF_SKIN, off_skin as f64);
     cx.publish(KEPT_OUT, kept.kept_out as f64);
     cx.publish(CROSSINGS_LEFT, kept.crossings_left as f64);
     cx.publish(STARTED_INSIDE, kept.started_inside as f64);
     cx.publish(LENGTH_ERROR, kept.length_error.max(length_error));
     Ok(OUT.with(out))
+}
+
+/// Number of guides whose roots are off where the poses of their skin carry them.
+fn roots_off(rest: &Component, now: &Component, poses: &[RootPose]) -> usize {
+    let is_off = |(cvs, pose): (std::ops::Range<usize>, &RootPose)| {
+        let Some(first) = cvs.clone().next() else { return false };
+        let moved = to_f64(now.positions()[first]) - to_f64(rest.positions()[first]);
+        let off = (moved - pose.translation).norm();
+        off > 0.5 * pose.translation.norm() && off > 0.01 * length(&rest.positions()[cvs])
+    };
+    rest.runs().ranges().zip(poses).filter(|one| is_off(one.clone())).count()
 }
 
 /// Arc length at which a curve stops before the skin, in mean lengths of curves.
@@ -273,10 +295,11 @@ impl Bound {
         if cx.get(RADIUS) > 0.0 {
             weights = weights.within(&posts, &hairs, cx.get(RADIUS));
         }
-        let unguided = |hair: &usize| weights.of(*hair).iter().all(|guide| guide.weight == 0.0);
+        // Without guides there are no weights.
+        let unguided = |hair: &usize| weights.hairs() == 0 || weights.of(*hair).iter().all(|guide| guide.weight == 0.0);
         let far = |binding: &SkinBinding, part: &Component| binding.far_roots(part.runs().starts(), part.positions());
         Ok(Self {
-            unguided: (0..weights.hairs()).filter(unguided).count(),
+            unguided: (0..curves.element_count()).filter(unguided).count(),
             weights,
             middles: segment_middles(curves.runs().starts(), curves.positions()),
             mean_length: mean_length(curves),
@@ -288,10 +311,11 @@ impl Bound {
 
 fn mean_length(curves: &Component) -> f64 {
     let points = curves.positions();
-    let length = |cvs: std::ops::Range<usize>| -> f64 {
-        points[cvs].windows(2).map(|ends| (to_f64(ends[1]) - to_f64(ends[0])).norm()).sum()
-    };
-    curves.runs().ranges().map(length).sum::<f64>() / curves.element_count().max(1) as f64
+    curves.runs().ranges().map(|cvs| length(&points[cvs])).sum::<f64>() / curves.element_count().max(1) as f64
+}
+
+fn length(cvs: &[[f32; 3]]) -> f64 {
+    cvs.windows(2).map(|ends| (to_f64(ends[1]) - to_f64(ends[0])).norm()).sum()
 }
 
 /// A binding as a key: it equals itself alone.

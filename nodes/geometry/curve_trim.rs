@@ -29,6 +29,9 @@ const OUT: Output = Output::like("curves", &CURVES, "The trimmed curves.");
 metrics! { METRICS:
     TOTAL = Metric::new("cvs", Unit::None, "Number of CVs.");
     NOTHING_LEFT = Metric::new("nothing_left", Unit::None, "Curves of which one CV is left.");
+    CROSSED = Metric::new("crossed", Unit::None, "Curves whose `from` is above their `to`, so that nothing is left of them.")
+        .warn_above(0.0, "Of curves whose `from` is above `to` one CV is left, so that nothing is drawn of them. Exchange the \
+            two numbers; with a mask, see that it keeps `from` below `to`.");
 }
 
 pub(crate) static NODE: Node = Node::new(
@@ -55,7 +58,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let curves = cx.part(CURVES);
     let (from, to) = (cx.mask(FROM, curves)?, cx.mask(TO, curves)?);
     let (mut samples, mut counts) = (Vec::with_capacity(curves.point_count()), Vec::new());
-    let mut nothing_left = 0;
+    let (mut nothing_left, mut crossed) = (0, 0);
     for cvs in curves.runs().ranges() {
         let first = samples.len();
         if !cvs.is_empty() {
@@ -63,12 +66,14 @@ fn cook(cx: &Cx) -> Result<Outputs> {
             let is_long = cvs.len() > 1;
             let left = trim(curves.positions(), cvs, ends, &mut samples);
             nothing_left += u32::from(is_long && !left);
+            crossed += u32::from(ends[0] > ends[1]);
         }
         counts.push((samples.len() - first) as u32);
     }
     let out = sampled(cx, curves, counts, &samples)?;
     cx.publish(TOTAL, out.point_count() as f64);
     cx.publish(NOTHING_LEFT, f64::from(nothing_left));
+    cx.publish(CROSSED, f64::from(crossed));
     let mut edited = cx.edit(CURVES);
     *edited = out;
     Ok(OUT.with(edited))
@@ -145,6 +150,16 @@ mod tests {
 
     fn trimmed(from: f32, to: f32) -> Bench {
         bench(&NODE).input(CURVES, corner()).set(FROM, from.into()).set(TO, to.into())
+    }
+
+    #[test]
+    fn ends_the_wrong_way_round_are_counted() {
+        let crossed = |from, to| trimmed(from, to).cook().metrics["crossed"];
+        assert_eq!([crossed(0.2, 0.6), crossed(0.5, 0.5), crossed(0.6, 0.2)], [0.0, 0.0, 2.0]);
+        // A mask that takes one of the two curves from 0.7 to 0.35 only.
+        let long = Maskable { value: 0.7, attribute: Some("long".into()) };
+        let masked = bench(&NODE).input(CURVES, corner()).set(FROM, 0.5.into()).set(TO, long).cook();
+        assert_eq!(masked.metrics["crossed"], 1.0);
     }
 
     fn first(out: &BenchResult) -> &[Point] {

@@ -35,9 +35,9 @@ inputs! { INPUTS:
 params! { PARAMS:
     WIND_DIR: Param<[f64; 3]> = Param::direction("wind_dir", [1.0, 0.0, 0.0],
         "The direction that the wind blows towards. Its length does not matter.");
-    OFFSET: Param<f32> = Param::float("offset", 10.0,
+    OFFSET: Param<Maskable> = Param::maskable("offset", 10.0,
         "Largest distance upwind at which a collider still shelters a CV. 0 shelters nothing.")
-        .unit(Unit::Metres).at_least(0.0).soft(0.0, 100.0);
+        .unit(Unit::Metres).at_least(0.0).soft(0.0, 10.0);
     SHIELD: Param<Maskable> = Param::maskable("shield", 1.0,
         "Fraction of the wind that a fully sheltered curve loses: 0 leaves the wind alone, 1 removes all of it. Above \
          1 even partly sheltered curves become calm.")
@@ -89,7 +89,7 @@ pub(crate) static NODE: Node = Node::new(
 .metrics(METRICS)
 .neutral(|params, wires| match params {
     _ if wires.count(&COLLIDERS) == 0 => Some("no collider is wired"),
-    _ if params.get(OFFSET) == 0.0 => Some("`offset` is 0"),
+    _ if params.get(OFFSET).value == 0.0 => Some("`offset` is 0"),
     _ => None,
 })
 .neutral_fills(&[Fill::missing(ENVELOPE, 1.0), Fill::always(SHIELDED, 0.0), Fill::always(SHELTER, 0.0)])
@@ -122,7 +122,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     }
     let (shielded, cast) = match &group {
         _ if !looks => (vec![0.0; curves.element_count()], 0),
-        None => (sheltered(cx, &curves), curves.point_count()),
+        None => (sheltered(cx, &curves)?, curves.point_count()),
         Some(group) => sheltered_of(cx, group, &curves)?,
     };
 
@@ -147,19 +147,19 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 }
 
 /// The fraction of each curve's CVs that the colliders shelter.
-fn sheltered(cx: &Cx, curves: &Component) -> Vec<f32> {
+fn sheltered(cx: &Cx, curves: &Component) -> Result<Vec<f32>> {
     let smooth = cx.get(SMOOTH);
     let walls: Vec<Wall> = cx.part(COLLIDERS).into_iter().map(|mesh| Wall::of(mesh, smooth > 0.0)).collect();
     let colliders: Vec<Collider> = walls.iter().map(Wall::collider).collect();
     let how = Shield {
         wind: cx.get(WIND_DIR),
-        offset: cx.get(OFFSET),
+        offset: cx.mask(OFFSET, curves)?,
         distance: cx.get(DISTANCE),
         falloff: cx.get(FALLOFF),
         cone: WIDEST_CONE * smooth,
         skin_gap: cx.get(SKIN_GAP),
     };
-    shield(curves.runs().starts(), curves.positions(), &colliders, &how)
+    Ok(shield(curves.runs().starts(), curves.positions(), &colliders, &how))
 }
 
 /// The same where only the curves of a group are looked at, and the number of CVs that look.
@@ -167,7 +167,7 @@ fn sheltered_of(cx: &Cx, group: &Group, curves: &Component) -> Result<(Vec<f32>,
     let chosen = group.curves(curves.runs());
     let part = taken(curves, &chosen)?;
     let mut shielded = vec![0.0; curves.element_count()];
-    for (curve, share) in chosen.into_iter().zip(sheltered(cx, &part)) {
+    for (curve, share) in chosen.into_iter().zip(sheltered(cx, &part)?) {
         shielded[curve as usize] = share;
     }
     Ok((shielded, part.point_count()))
@@ -241,7 +241,7 @@ mod tests {
     fn a_half_sheltered_curve_loses_half_of_shield_at_any_scale() {
         for scale in [1e-3, 1.0, 1e3] {
             let bench = bench(&NODE).input(CURVES, curves(scale)).input(COLLIDERS, wall(scale));
-            let out = bench.set(OFFSET, 10.0 * scale).set(SHIELD, 0.5.into()).cook();
+            let out = bench.set(OFFSET, (10.0 * scale).into()).set(SHIELD, 0.5.into()).cook();
             assert_eq!(out.curves().get(SHIELDED), Some(&[0.5, 0.0][..]));
             assert_eq!(out.curves().get(ENVELOPE), Some(&[0.75, 0.75, 0.75, 0.75, 1.0, 1.0][..]));
             assert_eq!((out.metrics["sheltered_curves"], out.metrics["rays"]), (1.0, 6.0));
@@ -255,7 +255,7 @@ mod tests {
         let shelter = |bench: Bench| bench.cook().curves().get(SHELTER).unwrap().to_vec();
         assert_eq!(shelter(behind_a_wall().set(SHIELD, 0.5.into())), [0.25, 0.25, 0.25, 0.25, 0.0, 0.0]);
         assert_eq!(shelter(behind_a_wall().set(SHIELD, 5.0.into())), [1.0, 1.0, 1.0, 1.0, 0.0, 0.0]);
-        assert_eq!(shelter(behind_a_wall().set(OFFSET, 0.0)), [0.0; 6]);
+        assert_eq!(shelter(behind_a_wall().set(OFFSET, 0.0.into())), [0.0; 6]);
         let grouped = bench(&NODE).input(CURVES, some).input(COLLIDERS, wall(1.0)).set(GROUP, "some".into());
         assert_eq!(shelter(grouped), [0.5, 0.5, 0.5, 0.5, 0.0, 0.0]);
     }
@@ -301,10 +301,28 @@ mod tests {
 
     #[test]
     fn a_wall_beyond_the_offset_shelters_nothing() {
-        let with = |offset| behind_a_wall().set(OFFSET, offset).cook();
+        let with = |offset: f32| behind_a_wall().set(OFFSET, offset.into()).cook();
         assert_eq!(with(0.4).curves().get(SHIELDED), Some(&[0.0, 0.0][..]));
         assert_eq!(with(0.5).curves().get(SHIELDED), Some(&[0.5, 0.0][..]));
         assert_eq!(with(1e4).curves().get(SHIELDED), Some(&[0.5, 0.0][..]));
+    }
+
+    /// A mask of curves, with and without a group: the curve behind the wall looks far enough where its own offset is.
+    #[test]
+    fn a_mask_of_the_offset_is_read_at_each_curve() {
+        let with = |far: [f32; 2], group: &str| {
+            let mut curves = curves(1.0);
+            let part = curves.part_mut(Kind::Curves).unwrap();
+            part.set(Attr::<f32>::element("far"), far.to_vec()).unwrap();
+            part.set(Attr::<i32>::element("some"), vec![1, 0]).unwrap();
+            let offset = Maskable { value: 2.0, attribute: Some("far".into()) };
+            let bench = bench(&NODE).input(CURVES, curves).input(COLLIDERS, wall(1.0));
+            bench.set(OFFSET, offset).set(GROUP, group.into()).cook().curves().get(SHIELDED).unwrap().to_vec()
+        };
+        for group in ["", "some"] {
+            assert_eq!(with([0.5, 0.0], group), [0.5, 0.0]);
+            assert_eq!(with([0.2, 1.0], group), [0.0, 0.0]);
+        }
     }
 
     #[test]
@@ -317,7 +335,7 @@ mod tests {
         near(share(behind_a_wall().set(DISTANCE, 2.0).set(FALLOFF, 0.0)), 0.5);
         assert_eq!(share(behind_a_wall().set(DISTANCE, 0.4)), 0.0);
         assert_eq!(share(behind_a_wall().set(DISTANCE, 0.5).set(FALLOFF, 0.0)), 0.0, "at its end nothing is left");
-        assert_eq!(share(behind_a_wall().set(DISTANCE, 2.0).set(OFFSET, 0.4)), 0.0, "`offset` still ends it");
+        assert_eq!(share(behind_a_wall().set(DISTANCE, 2.0).set(OFFSET, 0.4.into())), 0.0, "`offset` still ends it");
         // A second wall farther upwind changes nothing, one between does: 1 − 0.25 ÷ 2.
         let at = |x: f32| {
             let mut wall = wall(1.0);
@@ -337,8 +355,10 @@ mod tests {
     #[test]
     fn fading_scales_with_the_scene() {
         let shares = |scale: f32| {
-            let bench =
-                bench(&NODE).input(CURVES, curves(scale)).input(COLLIDERS, wall(scale)).set(OFFSET, 10.0 * scale);
+            let bench = bench(&NODE)
+                .input(CURVES, curves(scale))
+                .input(COLLIDERS, wall(scale))
+                .set(OFFSET, (10.0 * scale).into());
             bench.set(DISTANCE, 2.0 * scale).set(FALLOFF, 3.0).cook().curves().get(SHIELDED).unwrap().to_vec()
         };
         let here = shares(1.0);
@@ -358,7 +378,7 @@ mod tests {
     #[test]
     fn without_colliders_or_offset_nothing_is_sheltered() {
         let alone = bench(&NODE).input(CURVES, curves(1.0)).cook();
-        let near = behind_a_wall().set(OFFSET, 0.0).cook();
+        let near = behind_a_wall().set(OFFSET, 0.0.into()).cook();
         for out in [alone, near] {
             assert_eq!(out.curves().get(SHIELDED), Some(&[0.0, 0.0][..]));
             assert_eq!(out.curves().get(ENVELOPE), Some(&[1.0; 6][..]));

@@ -250,3 +250,37 @@ fn frames_have_the_same_bits_in_any_order() {
         assert_eq!(bits(&alone), bits(&in_order[frame as usize - 1]), "frame {frame}");
     }
 }
+
+/// Guides that were not carried along are counted, and those that were, lifted a little or bent, are not.
+#[test]
+fn guides_that_the_moving_skin_leaves_behind_are_counted() {
+    let (curves, guides) = (field(12, 0.3), field(4, 0.0));
+    let pushed = |part: &Component, by: f64| moved(part, |p| p + DVec3::new(by, 0.5 * by, 0.0));
+    let off = |now: Component, by: f64| {
+        let skins = [floor(), pushed(&floor(), by)];
+        on_skin(curves.clone(), [guides.clone(), now], skins).cook().metrics["guides_off_skin"]
+    };
+    for by in [0.02, 1.0] {
+        assert_eq!(off(guides.clone(), by), 16.0);
+        assert_eq!(off(turned(&guides, 0.5), by), 16.0);
+        assert_eq!(off(pushed(&guides, by), by), 0.0);
+        // Lifted by a tenth of their lengths from where the skin carries them.
+        let lifted = moved(&turned(&pushed(&guides, by), 0.5), |p| p + DVec3::y() * 0.01);
+        assert_eq!(off(lifted, by), 0.0);
+    }
+    // On a skin that rests, guides may stand anywhere.
+    assert_eq!(off(moved(&guides, |p| p + DVec3::y() * 0.1), 0.0), 0.0);
+}
+
+#[test]
+fn curves_without_guides_are_counted() {
+    let (curves, guides, none) = (field(12, 0.3), field(4, 0.0), Component::curves(Vec::new(), Vec::new()).unwrap());
+    let unguided = |guides: Component, radius: f32| {
+        let now = turned(&guides, 0.5);
+        on_skin(curves.clone(), [guides, now], [floor(), floor()]).set(RADIUS, radius).cook().metrics["unguided"]
+    };
+    assert_eq!(unguided(guides.clone(), 0.0), 0.0);
+    assert_eq!(unguided(none, 0.0), 144.0);
+    let some = unguided(guides, 0.1);
+    assert!(some > 0.0 && some < 144.0, "{some}");
+}

@@ -14,8 +14,8 @@ use std::sync::Arc;
 pub(crate) const NAME: Param<Name> = Param::text(
     "clump",
     "",
-    "Name of an attribute of curves, whole numbers: curves with the same number move together, those below 0 alone. If \
-     empty, `clump_radius` may find clumps.",
+    "Name of an attribute of curves, whole numbers, be they integers or floats: curves with the same number move \
+     together, those below 0 alone. If empty, `clump_radius` may find clumps.",
 )
 .fixed();
 
@@ -73,8 +73,12 @@ pub(crate) fn of(params: &Params, curves: &Component, start: Option<&Component>)
         let radius = params.get(RADIUS);
         start.kept(Found(radius.to_bits()), || Ok(Clumps::within(roots(start).as_slice(), radius)))?
     } else {
-        let ids = curves.table(Owner::Element).get::<i32>(&name).ok_or_else(|| refused(&name, curves))?;
-        Arc::new(Clumps::of_ids(ids))
+        let table = curves.table(Owner::Element);
+        Arc::new(match (table.get::<i32>(&name), table.get::<f32>(&name)) {
+            (Some(ids), _) => Clumps::of_ids(ids),
+            (None, Some(numbers)) => Clumps::of_ids(&whole(&name, numbers)?),
+            (None, None) => return Err(refused(&name, curves)),
+        })
     };
     Ok(Some(clumps).filter(|clumps| !clumps.is_empty()))
 }
@@ -84,10 +88,27 @@ pub(crate) fn roots(curves: &Component) -> RootPositions {
     RootPositions::of(curves.runs().starts(), curves.positions())
 }
 
+/// Floats without fractions as integers; Attribute_Expr makes such.
+fn whole(name: &str, numbers: &[f32]) -> Result<Vec<i32>> {
+    // Above this not every whole number is a float.
+    const LARGEST: f32 = 16_777_216.0;
+    let mut ids = Vec::with_capacity(numbers.len());
+    for (curve, number) in numbers.iter().enumerate() {
+        if number.fract() != 0.0 || number.abs() > LARGEST {
+            let fact = format!("`clump` is `{name}`, which is {number} for curve {curve}, not a whole number");
+            let hint = "round it, such as with `floor` in Attribute_Expr; numbers up to 16777216 are held exactly";
+            return Err(Error::refused(fact).hint(hint).of("clump"));
+        }
+        ids.push(*number as i32);
+    }
+    Ok(ids)
+}
+
 fn refused(name: &str, curves: &Component) -> Error {
     let what = curves.describe(name).map_or("which the curves do not have".into(), |found| format!("which is {found}"));
-    let fits =
-        |(owner, _, column): &(Owner, &Name, &Column)| *owner == Owner::Element && column.kind() == ColumnType::I1;
+    let fits = |(owner, _, column): &(Owner, &Name, &Column)| {
+        *owner == Owner::Element && matches!(column.kind(), ColumnType::I1 | ColumnType::F1)
+    };
     let hint = match nearest(name, curves.columns().filter(fits).map(|(_, name, _)| &**name)) {
         Some(near) => format!("did you mean `{near}`?"),
         None => "expected an attribute of one whole number for each curve".to_owned(),
@@ -98,3 +119,32 @@ fn refused(name: &str, curves: &Component) -> Error {
 /// Key of the clumps found with a radius, as bits.
 #[derive(PartialEq)]
 struct Found(u32);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn curves(numbers: [f32; 3]) -> Component {
+        let mut curves = Component::curves(vec![1; 3], vec![[0.0; 3]; 3]).unwrap();
+        curves.set(Attr::<f32>::element("tuft"), numbers.to_vec()).unwrap();
+        curves.set(Attr::<[f32; 3]>::element("colour"), vec![[0.0; 3]; 3]).unwrap();
+        curves
+    }
+
+    #[test]
+    fn floats_without_fractions_are_whole_numbers() {
+        assert_eq!(whole("tuft", &[2.0, -1.0, 16_777_216.0]).unwrap(), [2, -1, 16_777_216]);
+        for odd in [0.5, f32::NAN, f32::INFINITY, 16_777_218.0] {
+            let error = whole("tuft", &[2.0, odd]).unwrap_err();
+            assert!(error.fact.contains(&format!("is {odd} for curve 1")), "{error}");
+        }
+    }
+
+    #[test]
+    fn only_one_number_a_curve_names_clumps() {
+        let error = refused("tufft", &curves([0.0; 3])).to_string();
+        assert_eq!(error, "`clump` is `tufft`, which the curves do not have; did you mean `tuft`?");
+        let error = refused("colour", &curves([0.0; 3])).to_string();
+        assert!(error.contains("expected an attribute of one whole number for each curve"), "{error}");
+    }
+}

@@ -181,9 +181,13 @@ impl Block {
     #[inline(always)]
     pub fn boxes(&self) -> Boxes {
         let [a, b, c] = &self.corners;
-        let low = |axis: usize| a[axis].least(&b[axis]).least(&c[axis]);
-        let high = |axis: usize| a[axis].most(&b[axis]).most(&c[axis]);
-        Boxes { low: [low(0), low(1), low(2)], high: [high(0), high(1), high(2)] }
+        let mut boxes = Boxes { low: *a, high: *a };
+        // No closures here: they are not compiled for a kernel's path.
+        for axis in 0..3 {
+            boxes.low[axis] = a[axis].least(&b[axis]).least(&c[axis]);
+            boxes.high[axis] = a[axis].most(&b[axis]).most(&c[axis]);
+        }
+        boxes
     }
 }
 

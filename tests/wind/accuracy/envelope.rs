@@ -58,7 +58,14 @@ fn wrong_rays((mesh, triangles): &(Vec<Point>, Vec<[u32; 3]>)) -> [usize; 2] {
     let starts: Vec<u32> = (0..=points.len() as u32).collect();
     let (mut wrong, mut sure) = (0, 0);
     for offset in [0.2, 1.0, 3.0, 10.0, 100.0, 1e4] {
-        let how = Shield { wind: [1.0, 0.0, 0.0], offset, distance: 0.0, falloff: 1.0, cone: 0.0, skin_gap: 0.0 };
+        let how = Shield {
+            wind: [1.0, 0.0, 0.0],
+            offset: offset.into(),
+            distance: 0.0,
+            falloff: 1.0,
+            cone: 0.0,
+            skin_gap: 0.0,
+        };
         let found = shield(&starts, &points, &[Collider::of(mesh, triangles)], &how);
         for (point, found) in points.iter().zip(found) {
             let [x, y, z] = point.map(f64::from);
@@ -85,7 +92,8 @@ fn odd_curves((mesh, triangles): &(Vec<Point>, Vec<[u32; 3]>)) -> [usize; 3] {
     let points = strewn(3500, 1.5);
     let starts: Vec<u32> = (0..=500).map(|curve| 7 * curve).collect();
     let mirrored = |points: &[Point]| points.iter().map(|[x, y, z]| [-x, *y, *z]).collect::<Vec<Point>>();
-    let how = Shield { wind: [1.0, 0.2, -0.1], offset: 10.0, distance: 0.0, falloff: 1.0, cone: 0.0, skin_gap: 0.0 };
+    let how =
+        Shield { wind: [1.0, 0.2, -0.1], offset: 10.0.into(), distance: 0.0, falloff: 1.0, cone: 0.0, skin_gap: 0.0 };
     let back = Shield { wind: [-1.0, 0.2, -0.1], ..how };
     let shares = shield(&starts, &points, &[Collider::of(mesh, triangles)], &how);
     let others = shield(&starts, &mirrored(&points), &[Collider::of(&mirrored(mesh), triangles)], &back);

@@ -4,17 +4,18 @@
 //! sweeps across it, depending on whether its goal is slightly below or above the skin, and wind straight into the skin
 //! presses curves to one side or the other. No continuous map from all directions to those above the skin can leave the
 //! latter unchanged and keep the side of all others; so the deeper a goal lies in the skin, the more upright the
-//! segment is kept.
+//! segment is kept, nearly as its goal reflected by the skin; an arch lifts it a little more, off what lies beside it.
 
 use numerics::vector::DVec3;
 use std::f64::consts::FRAC_PI_2;
 
-/// How upright a segment is kept by wind straight into the skin, relative to its direction along the curve: of 0.5 to 3
-/// the value with the fewest jumps on a camel (studies/coherence_study).
-const UPRIGHT: f64 = 2.0;
+/// How upright a segment is kept by wind straight into the skin, relative to the direction of its curve, which earlier
+/// segments have turned: the less upright, the more their changes add up towards the tip. Of 2, 5, 10 and
+/// 100, with an arch of 0 to 2, this pair has the fewest jumps on a camel (studies/coherence_study).
+const UPRIGHT: f64 = 10.0;
 
-/// Height above the skin of the path from one side to the other.
-const ARCH: f64 = 2.0;
+/// Height above the skin of the path from one side to the other, beyond that of a circle.
+const ARCH: f64 = 1.5;
 
 /// The skin under a segment.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +45,8 @@ impl Ground {
         };
         let standing = self.left_standing(along, room);
         let Some(pressed) = edge(goal) else { return standing };
-        let mixed = pressed * (1.0 - share) + standing * share + n * (ARCH * share * (1.0 - share) * room);
+        let (sine, cosine) = libm::sincos(share * FRAC_PI_2);
+        let mixed = pressed * cosine + standing * sine + n * (ARCH * share * (1.0 - share) * room);
         // If there is room below the pivot, the path between two directions above the ground may still dip into it.
         match mixed.try_normalize(1e-9) {
             Some(led) if led.dot(n) < -libm::sin(lowest) => edge(&led).unwrap_or(pressed),
@@ -87,7 +89,7 @@ mod tests {
         let ground = Ground { normal: DVec3::z(), height: 0.0 };
         for goal in [-DVec3::z(), DVec3::new(1e-12, 0.0, -1.0), DVec3::new(0.0, -1e-12, -1.0)] {
             let led = ground.lead_out(&DVec3::x(), &goal, 1.0);
-            assert!((led - DVec3::new(1.0, 0.0, 2.0).normalize()).norm() < 1e-9, "{led}");
+            assert!((led - DVec3::new(1.0, 0.0, UPRIGHT).normalize()).norm() < 1e-9, "{led}");
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::triangle_filter::may_cross;
 use numerics::lanes::get;
-use numerics::tree::{Block, TriangleTree};
+use numerics::tree::{Block, Boxes, Cuboid, Region, TriangleTree};
 use numerics::vector::{DVec3, Vec3, to_f64};
 
 /// A segment through a triangle.
@@ -15,6 +15,9 @@ pub(super) struct Crossing {
     /// Unit normal of the triangle, towards the segment's start.
     pub(super) normal: DVec3,
 }
+
+/// Number of triangles of a block that are tested one by one, rather than to exclude some of them sixteen at a time.
+const FEW: u32 = 1;
 
 /// The corners of a block's triangle.
 #[inline(always)]
@@ -67,10 +70,26 @@ pub(super) fn first_crossing_in(obstacles: &[&TriangleTree], a: Vec3, b: Vec3) -
     first
 }
 
+/// Whether the segment from `a` to `b` crosses one of some triangles of a block with these `boxes`.
+#[inline(always)]
+pub(super) fn crosses_block(block: &Block, boxes: &Boxes, lanes: u16, a: Vec3, b: Vec3) -> bool {
+    let (mut low, mut high) = (a, a);
+    for axis in 0..3 {
+        low[axis] = low[axis].min(b[axis]);
+        high[axis] = high[axis].max(b[axis]);
+    }
+    let lanes = lanes & Cuboid { low, high }.meeting(boxes);
+    let mut first = None;
+    if lanes != 0 {
+        add_crossings(block, lanes, a, b, &mut first);
+    }
+    first.is_some()
+}
+
 /// Replaces `first` by the first crossing with some triangles of a block, if that is nearer to `a`.
 #[inline(always)]
 pub(super) fn add_crossings(block: &Block, lanes: u16, a: Vec3, b: Vec3, first: &mut Option<Crossing>) {
-    let mut lanes = lanes & may_cross(block, a, b);
+    let mut lanes = if lanes.count_ones() > FEW { lanes & may_cross(block, a, b) } else { lanes };
     while lanes != 0 {
         let lane = lanes.trailing_zeros() as usize;
         lanes &= lanes - 1;

@@ -6,13 +6,13 @@
 
 use super::Collide;
 use super::segment_turn::Segment;
-use numerics::lanes::LANES;
+use numerics::lanes::{F32x16, LANES};
 use numerics::tree::{Block, Boxes, Region};
 use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
 
 /// Rounding relative to the largest coordinate: of f32 positions and boxes 1e-7, of the plane of a turn, whose sine is at
 /// least 1e-9, 2e-7.
-const ROUNDING: f64 = 5e-7;
+pub(super) const ROUNDING: f64 = 5e-7;
 
 /// Cosine of the angle between the facet under a root and the smooth normal up to which the facet's normal is taken. It
 /// is preferred because the smooth one tilts: along it the root's own facet rises beside the root.
@@ -25,16 +25,16 @@ const OPPOSITE: f64 = 0.01;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct HalfSpace {
     /// Its direction, at most of length 1.
-    up: Vec3,
+    pub(super) up: Vec3,
     /// Distances from the root, metres, ascending; what is not known has a distance of 0.
-    reaches: [f32; SHELLS],
+    pub(super) reaches: [f32; SHELLS],
     /// The highest point of obstacles within each of these distances, above the root, metres. Segments near the root need
     /// to be above what is near it alone.
-    rises: [f32; SHELLS],
+    pub(super) rises: [f32; SHELLS],
 }
 
 /// Number of distances: a curve of five CVs has a segment more within each.
-const SHELLS: usize = 4;
+pub(super) const SHELLS: usize = 4;
 
 impl HalfSpace {
     /// The half-space of the curve `cvs`, displaced by `shift`, whose largest diameter is `width` metres
@@ -57,8 +57,8 @@ impl HalfSpace {
         // Shortened by more than the rounding to f32 may lengthen it.
         let up = to_f32(up * (1.0 - 1e-6));
         let mut above = Above {
-            low: to_f32(root),
-            high: to_f32(root),
+            low: to_f32(root.map(|x| x - reach - 8.0 * slack)),
+            high: to_f32(root.map(|x| x + reach + 8.0 * slack)),
             root: to_f32(root),
             up,
             rise: f64::NEG_INFINITY,
@@ -67,23 +67,28 @@ impl HalfSpace {
             reach: reach as f32,
         };
         above.add(&facet, &root);
+        let mut reaches = [0.0; SHELLS];
+        for shell in 0..SHELLS {
+            reaches[shell] = (reach_of(shell) + 9.0 * slack) as f32;
+        }
+        let mut rises = [F32x16::splat(f32::NEG_INFINITY); SHELLS];
+        for tree in how.obstacles {
+            let mut walk = tree.walk(above);
+            while let Some((block, _)) = walk.next() {
+                walk.region().add_block(&tree.blocks()[block], &reaches, &mut rises);
+            }
+        }
         let mut known = Self { up, ..Self::default() };
         for shell in 0..SHELLS {
-            let reach = reach_of(shell);
-            above.low = to_f32(root.map(|x| x - reach - 8.0 * slack));
-            above.high = to_f32(root.map(|x| x + reach + 8.0 * slack));
-            for tree in how.obstacles {
-                let mut walk = tree.walk(above);
-                while let Some((block, lanes)) = walk.next() {
-                    walk.region().add_lanes(&tree.blocks()[block], lanes, &root);
-                    // No segment starts higher than the curve is long.
-                    if walk.region().rise > length {
-                        return known;
-                    }
-                }
-                above = *walk.region();
+            for lane in 0..LANES {
+                above.rise = above.rise.max(f64::from(rises[shell].0[lane]));
             }
-            (known.reaches[shell], known.rises[shell]) = (reach as f32, ((above.rise + slack) as f32).next_up());
+            // No segment starts higher than the curve is long.
+            if above.rise > length {
+                return known;
+            }
+            known.reaches[shell] = reach_of(shell) as f32;
+            known.rises[shell] = ((above.rise + slack) as f32).next_up();
         }
         known
     }
@@ -111,8 +116,8 @@ impl HalfSpace {
     }
 
     /// Whether a curve with this root is above all obstacles near it, but for `untested` metres at its start. One with
-    /// a coordinate that is NaN or infinite is not.
-    #[inline(always)]
+    /// a coordinate that is NaN or infinite is not. Kernels test sixteen at a time.
+    #[cfg(test)]
     pub(super) fn clears_curve(&self, root: &DVec3, cvs: &[Vec3], untested: f64) -> bool {
         let up = to_f64(self.up);
         let mut largest = 0.0_f32;
@@ -215,12 +220,38 @@ impl Region for Above {
 }
 
 impl Above {
+    /// Adds the heights of a block's triangles to the `rises` within distances from the root, one a lane.
     #[inline(always)]
-    fn add_lanes(&mut self, block: &Block, mut lanes: u16, root: &DVec3) {
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
-            self.add(&super::crossing::corners(block, lane), root);
+    fn add_block(&self, block: &Block, reaches: &[f32; SHELLS], rises: &mut [F32x16; SHELLS]) {
+        let boxes = block.boxes();
+        let mut away = F32x16::splat(f32::NEG_INFINITY);
+        for axis in 0..3 {
+            let root = self.root[axis];
+            for lane in 0..LANES {
+                let (before, after) = (boxes.low[axis].0[lane] - root, root - boxes.high[axis].0[lane]);
+                let most = if before > after { before } else { after };
+                away.0[lane] = if most > away.0[lane] { most } else { away.0[lane] };
+            }
+        }
+        let mut heights = F32x16::splat(f32::NEG_INFINITY);
+        for corner in &block.corners {
+            for lane in 0..LANES {
+                let x = corner[0].0[lane] - self.root[0];
+                let y = corner[1].0[lane] - self.root[1];
+                let z = corner[2].0[lane] - self.root[2];
+                let size = x.abs() + y.abs() + z.abs();
+                // Five roundings to f32; its intersection with a circle of radius `reach` is computed in f64 to the square
+                // of its size.
+                let doubt = 3e-7 * size + 2e-14 * size * (size / self.reach);
+                let height = self.up[0] * x + self.up[1] * y + self.up[2] * z + doubt;
+                heights.0[lane] = if height > heights.0[lane] { height } else { heights.0[lane] };
+            }
+        }
+        for shell in 0..SHELLS {
+            for lane in 0..LANES {
+                let within = away.0[lane] <= reaches[shell] && heights.0[lane] > rises[shell].0[lane];
+                rises[shell].0[lane] = if within { heights.0[lane] } else { rises[shell].0[lane] };
+            }
         }
     }
 

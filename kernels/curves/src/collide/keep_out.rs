@@ -11,12 +11,14 @@
 //! not lifted the start, which touches the skin, is not tested. Surfaces are obstacles, not volumes: a curve wholly inside
 //! stays there.
 
-use super::crossing::first_crossing;
+use super::crossing::crosses_block;
 use super::hair::SKIPPED_GAPS;
 use super::half_space::HalfSpace;
 use super::segment_turn::{Nearby, gather};
 use super::{Collide, ContactMethod, SkinSurface, collide};
 use crate::attach::{RootPose, attach_curve, relative_stretch};
+use clear_lanes::ClearLanes;
+use numerics::lanes::LANES;
 use numerics::masked::Masked;
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
@@ -27,6 +29,7 @@ use std::ops::Range;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+mod clear_lanes;
 mod settle;
 
 /// Number of curves in a task.
@@ -176,6 +179,12 @@ fn turn_out(
 }
 
 impl KeepOut<'_> {
+    /// Whether a curve's root, `now`, is off the skin, on which `root` is.
+    #[inline(always)]
+    fn is_lifted(&self, now: Vec3, root: &DVec3) -> bool {
+        (to_f64(now) - root).norm() >= LIFTED * self.gap
+    }
+
     /// Length at the start of a curve that is not tested.
     fn untested(&self, lifted: bool) -> f64 {
         if lifted { 0.0 } else { SKIPPED_GAPS * self.gap }
@@ -275,19 +284,21 @@ fn entering_task(
 ) -> Vec<Entering> {
     let (mut entered, mut rest) = (Vec::new(), Vec::new());
     let mut nearby = Nearby::default();
-    for curve in curves {
+    let (mut clear, mut group) = (0_u16, curves.start);
+    for curve in curves.clone() {
+        if (curve - group).is_multiple_of(LANES) {
+            group = curve;
+            clear = clear_of(curve..curves.end.min(curve + LANES), starts, points, how, half_spaces);
+        }
         let cvs = starts[curve] as usize..starts[curve + 1] as usize;
         let now = &points[cvs.clone()];
-        if now.len() < 2 {
+        if clear >> (curve - group) & 1 == 1 || now.len() < 2 || !is_finite(now) {
             continue;
         }
         let root = how.root(curve, cvs.start);
-        let lifted = (to_f64(now[0]) - root).norm() >= LIFTED * how.gap;
+        let lifted = how.is_lifted(now[0], &root);
         let untested = how.untested(lifted);
         let known = half_spaces.get(curve).zip(Some(root));
-        if known.as_ref().is_some_and(|known| known.0.clears_curve(&known.1, now, untested)) || !is_finite(now) {
-            continue;
-        }
         rest.resize(now.len(), [0.0; 3]);
         how.write_rest(curve, cvs, now[0], &mut rest);
         let (outside, start, tree) = (tested_start(&rest, untested), tested_start(now, untested), how.skin.tree);
@@ -302,6 +313,31 @@ fn entering_task(
         }
     }
     entered
+}
+
+/// A bit for each of sixteen `curves` that stays in its half-space.
+#[inline(always)]
+fn clear_of(
+    curves: Range<usize>,
+    starts: &[u32],
+    points: &[Vec3],
+    how: &KeepOut<'_>,
+    half_spaces: &[HalfSpace],
+) -> u16 {
+    let mut lanes = ClearLanes::none();
+    if curves.end > half_spaces.len() {
+        return 0;
+    }
+    for lane in 0..curves.len() {
+        let curve = curves.start + lane;
+        let (first, end) = (starts[curve] as usize, starts[curve + 1] as usize);
+        if end - first >= 2 {
+            let root = how.root(curve, first);
+            let untested = how.untested(how.is_lifted(points[first], &root));
+            lanes.put(lane, [first, end - first], &half_spaces[curve], &root, untested);
+        }
+    }
+    lanes.clear(points)
 }
 
 fn is_finite(cvs: &[Vec3]) -> bool {
@@ -366,17 +402,20 @@ fn crosses<'t>(
         if nearby.is_empty() {
             continue;
         }
-        for k in (first..end).filter(|k| tested[k - first]) {
-            let Some(from) = (if k == 0 { start } else { Some(cvs[k]) }) else { continue };
-            if first_crossing(nearby, from, cvs[k + 1]).is_some() {
+        for (block, lanes) in nearby.iter() {
+            let boxes = block.boxes();
+            for k in first..end {
+                let Some(from) = (if k == 0 { start } else { Some(cvs[k]) }) else { continue };
+                if tested[k - first] && crosses_block(block, &boxes, *lanes, from, cvs[k + 1]) {
+                    return true;
+                }
+            }
+            if let (Some(outside), Some(start), true) = (outside, start, first == 0 && tested[0])
+                && outside != start
+                && crosses_block(block, &boxes, *lanes, outside, start)
+            {
                 return true;
             }
-        }
-        if let (Some(outside), Some(start), true) = (outside, start, first == 0 && tested[0])
-            && outside != start
-            && first_crossing(nearby, outside, start).is_some()
-        {
-            return true;
         }
     }
     false

@@ -5,7 +5,7 @@ use super::crossing::{Crossing, corners, first_crossing};
 use super::sector::{Blocked, Sector};
 use super::triangle_filter::Wedge;
 use super::{ContactMethod, perpendicular};
-use numerics::tree::{Block, TriangleTree};
+use numerics::tree::{Block, Cuboid, TriangleTree};
 use numerics::vector::{DVec3, Vec3, to_f32};
 use std::f64::consts::PI;
 
@@ -182,7 +182,9 @@ enum Sweep {
 pub(super) fn gather<'t>(obstacles: &[&'t TriangleTree], low: Vec3, high: Vec3, nearby: &mut Nearby<'t>) {
     nearby.clear();
     for tree in obstacles {
-        tree.visit_box(low, high, |block, lanes| nearby.push((block, lanes)));
+        for (block, lanes) in tree.walk(Cuboid { low, high }) {
+            nearby.push((&tree.blocks()[block], lanes));
+        }
     }
 }
 

@@ -1,13 +1,14 @@
 //! Hairs turned as their guides are.
 
-use super::turns::{GuideTurns, SegmentTurns, TURNED};
-use crate::attach::{RootPose, relative_stretch, tasks};
-use crate::guides::{GuideWeight, GuideWeights};
-use nalgebra::{Quaternion, Unit};
+use super::hair_lanes::HairLanes;
+use super::turns::GuideTurns;
+use crate::attach::{RootPose, tasks};
+use crate::guides::GuideWeights;
+use numerics::lanes::LANES;
 use numerics::masked::Masked;
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
-use numerics::vector::{DMat3, DQuat, DVec3, Vec3, to_f32, to_f64};
+use numerics::vector::{DQuat, Vec3};
 use std::ops::Range;
 
 /// What a groom follows.
@@ -37,12 +38,6 @@ pub struct DeformedCurves {
     /// Largest change of a segment's length ÷ its curve's length, measured on the results.
     pub length_error: f64,
 }
-
-/// Below this the sum of rotations has cancelled, and the guide with the largest weight decides.
-const CANCELLED: f64 = 1e-9;
-
-/// Weights sum to 1 up to this.
-const WEIGHT_ROUNDING: f64 = 1e-6;
 
 /// Deforms curves `rest[starts[i]..starts[i + 1]]`, with the rotation of each CV if `with_rotations`.
 ///
@@ -90,179 +85,17 @@ fn follow_task(
     out: &mut [Vec3],
     with_rotations: bool,
 ) -> (f64, Vec<DQuat>) {
-    let (mut largest, mut rotations, mut shares, mut base) = (0.0_f64, Vec::new(), Vec::new(), 0);
-    for curve in curves {
-        let rows = starts[curve] as usize..starts[curve + 1] as usize;
-        let mine = &mut out[base..base + rows.len()];
-        base += rows.len();
-        let hair = Hair { curve, first: rows.start, rest: &rest[rows], how };
-        hair.follow(&mut shares, mine, if with_rotations { Some(&mut rotations) } else { None });
-        largest = largest.max(relative_stretch(mine, hair.rest));
+    let base = starts[curves.start] as usize;
+    let (mut largest, mut shares, mut rotations) = (0.0_f64, Vec::new(), Vec::new());
+    if with_rotations {
+        rotations.resize(out.len(), DQuat::identity());
+    }
+    let mut first = curves.start;
+    while first < curves.end {
+        let end = if curves.end - first > LANES { first + LANES } else { curves.end };
+        let hairs = HairLanes::of(first..end, starts, rest, how);
+        largest = largest.max(hairs.follow(&mut shares, base, out, &mut rotations));
+        first = end;
     }
     (largest, rotations)
-}
-
-struct Hair<'a> {
-    curve: usize,
-    /// Row of its root.
-    first: usize,
-    rest: &'a [Vec3],
-    how: &'a CurveDeform<'a>,
-}
-
-/// What a guide contributes to a hair.
-struct Share {
-    weight: f64,
-    /// The weight times the rotation from the guide's frame to the hair's.
-    matrix: DMat3,
-    /// The guide's segments, and the one where the last lookup ended.
-    rows: Range<usize>,
-    at: usize,
-}
-
-impl Hair<'_> {
-    #[inline(always)]
-    fn follow(&self, shares: &mut Vec<Share>, out: &mut [Vec3], mut rotations: Option<&mut Vec<DQuat>>) {
-        let Some(root) = out.first_mut() else { return };
-        let offset = self.gather(shares);
-        let mut unguided = 1.0;
-        for share in shares.iter() {
-            unguided -= share.weight;
-        }
-        let (mut displacement, mut still) = (offset * self.blend(0), None);
-        if let Some(poses) = self.how.poses {
-            let pose = &poses[self.curve];
-            // Added as displacements, so that guides at rest change no bit.
-            displacement = pose.translation + pose.rotation * displacement;
-            still = Some(pose.rotation);
-        }
-        *root = to_f32(to_f64(self.rest[0]) + displacement);
-        let mut rotation = still.unwrap_or_else(DQuat::identity);
-        // Hairs before this one have a segment less than CVs.
-        let segments = self.rest.len() - 1;
-        let middles = &self.how.middles[self.first - self.curve..][..segments];
-        for first in (0..segments).step_by(TURNED) {
-            let count = TURNED.min(segments - first);
-            let mut turns = self.turns(shares, &middles[first..first + count], unguided);
-            self.take_part(&mut turns, first, count);
-            let mut along = [[0.0; TURNED]; 3];
-            for lane in 0..count {
-                let [from, to] = [self.rest[first + lane], self.rest[first + lane + 1]];
-                for axis in 0..3 {
-                    along[axis][lane] = f64::from(to[axis]) - f64::from(from[axis]);
-                }
-            }
-            let mut turned = turns.rotate(&along);
-            if let Some(still) = &still {
-                turned = SegmentTurns::all(still).rotate(&turned);
-            }
-            for lane in 0..count {
-                for axis in 0..3 {
-                    displacement[axis] += turned[axis][lane] - along[axis][lane];
-                }
-                let cv = first + lane + 1;
-                out[cv] = to_f32(to_f64(self.rest[cv]) + displacement);
-                if let Some(rotations) = &mut rotations {
-                    let turn = turns.quaternion(lane);
-                    rotation = still.map_or(turn, |still| still * turn);
-                    rotations.push(rotation);
-                }
-            }
-        }
-        if let Some(rotations) = rotations {
-            rotations.push(rotation);
-        }
-    }
-
-    /// Collects its guides; returns the mean offset of their roots, in its own frame.
-    #[inline(always)]
-    fn gather(&self, shares: &mut Vec<Share>) -> DVec3 {
-        shares.clear();
-        let mut offset = DVec3::zeros();
-        if self.how.weights.hairs() == 0 {
-            return offset;
-        }
-        for guide in self.how.weights.of(self.curve) {
-            if guide.weight <= 0.0 {
-                continue;
-            }
-            let (rows, matrix) = (self.how.turns.rows(guide.guide as usize), weighted(guide));
-            offset += matrix * self.how.turns.offset(guide.guide as usize);
-            shares.push(Share { weight: f64::from(guide.weight), matrix, at: rows.start, rows });
-        }
-        offset
-    }
-
-    /// The mean rotations of its guides at some fractions of their lengths; `unguided` is the weight that no guide holds.
-    #[inline(always)]
-    fn turns(&self, shares: &mut [Share], middles: &[f64], unguided: f64) -> SegmentTurns {
-        let mut sum = SegmentTurns::default();
-        let mut heaviest: Option<SegmentTurns> = None;
-        for share in shares {
-            if share.rows.is_empty() {
-                sum.add_still(share.weight);
-                continue;
-            }
-            let turns = self.how.turns.at(&share.rows, middles, &mut share.at);
-            let turns = turns.weighted(share.weight, &share.matrix);
-            sum.add(&turns);
-            if heaviest.is_none() {
-                heaviest = Some(turns);
-            }
-        }
-        // What no guide holds stays at rest.
-        sum.add_still(if unguided > WEIGHT_ROUNDING { unguided } else { 0.0 });
-        let sizes = sum.sizes();
-        let mut unit = sum.divided(&sizes);
-        for lane in 0..middles.len() {
-            if sizes[lane] > CANCELLED {
-                continue;
-            }
-            let heaviest = heaviest.unwrap_or_else(|| SegmentTurns::all(&DQuat::identity()));
-            unit.set(lane, &heaviest.divided(&heaviest.sizes()));
-        }
-        unit
-    }
-
-    /// Replaces rotations by the part that the CVs from `first` on follow.
-    #[inline(always)]
-    fn take_part(&self, turns: &mut SegmentTurns, first: usize, count: usize) {
-        for lane in 0..count {
-            let share = self.blend(first + lane);
-            if share == 1.0 {
-                continue;
-            }
-            let turn = turns.quaternion(lane);
-            let (sine, cosine) = (turn.imag().norm(), turn.w);
-            let mut part = DQuat::identity();
-            if sine > 0.0 {
-                let (part_sine, part_cosine) = libm::sincos(share * libm::atan2(sine, cosine));
-                part = Unit::new_unchecked(Quaternion::from_parts(part_cosine, turn.imag() * (part_sine / sine)));
-            }
-            turns.set(lane, &SegmentTurns::all(&part));
-        }
-    }
-
-    #[inline(always)]
-    fn blend(&self, cv: usize) -> f64 {
-        f64::from(self.how.blend.at(self.first + cv)).clamp(0.0, 1.0)
-    }
-}
-
-/// A guide's weight times the rotation from its frame to the hair's.
-#[inline(always)]
-fn weighted(guide: &GuideWeight) -> DMat3 {
-    let [x, y, z, w] = guide.rotation.map(f64::from);
-    let weight = f64::from(guide.weight);
-    if [x, y, z] == [0.0; 3] {
-        return DMat3::from_diagonal_element(weight);
-    }
-    // Divided by its squared length, which rounding to f32 made unequal to 1.
-    let twice = 2.0 / (x * x + y * y + z * z + w * w);
-    let rows = [
-        [1.0 - twice * (y * y + z * z), twice * (x * y - w * z), twice * (x * z + w * y)],
-        [twice * (x * y + w * z), 1.0 - twice * (x * x + z * z), twice * (y * z - w * x)],
-        [twice * (x * z - w * y), twice * (y * z + w * x), 1.0 - twice * (x * x + y * y)],
-    ];
-    DMat3::from(rows).transpose() * weight
 }

@@ -13,6 +13,7 @@
 //! lengths up to the rounding of positions; a hair that is a guide, alone at its root, becomes that guide; the same bits
 //! on any number of threads. f64 inside. Metres.
 
+mod hair_lanes;
 mod hairs;
 mod roots;
 mod turns;

@@ -2,135 +2,80 @@
 
 use crate::attach::RootPose;
 use nalgebra::{Quaternion, Vector3};
+use numerics::lanes::{F64x16, LANES};
 use numerics::parallel;
-use numerics::vector::{self, DMat3, DQuat, DVec3, to_f32, to_f64};
+use numerics::vector::{self, DQuat, DVec3, to_f32, to_f64};
 use std::ops::Range;
 
-/// A rotation as w and x, y, z. Along a guide its sign is continuous: turns of more than half a revolution are kept
+/// A rotation as w, x, y, z. Along a guide its sign is continuous: turns of more than half a revolution are kept
 /// apart from the lesser ones with the same result.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Turn {
-    w: f64,
-    v: DVec3,
-}
+type Turn = [f64; 4];
 
-/// Number of segments that are turned side by side.
-pub(super) const TURNED: usize = 4;
+/// Rotations of sixteen segments, side by side: w, x, y, z.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LaneTurns(pub(super) [F64x16; 4]);
 
-/// Rotations of successive segments of a curve, side by side: w, x, y, z.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct SegmentTurns([[f64; TURNED]; 4]);
-
-impl SegmentTurns {
-    /// The same for all.
+impl LaneTurns {
+    /// None on all lanes.
     #[inline(always)]
-    pub(super) fn all(turn: &DQuat) -> Self {
-        Self([[turn.w; TURNED], [turn.i; TURNED], [turn.j; TURNED], [turn.k; TURNED]])
+    pub(super) fn none() -> Self {
+        Self([F64x16([1.0; LANES]), F64x16::ZERO, F64x16::ZERO, F64x16::ZERO])
     }
 
     #[inline(always)]
-    fn put(&mut self, lane: usize, turn: &Turn) {
-        let Turn { w, v } = turn;
-        for (part, value) in [*w, v.x, v.y, v.z].into_iter().enumerate() {
-            self.0[part][lane] = value;
-        }
-    }
-
-    /// Takes one of the rotations from others.
-    #[inline(always)]
-    pub(super) fn set(&mut self, lane: usize, from: &Self) {
+    pub(super) fn put(&mut self, lane: usize, turn: &Turn) {
         for part in 0..4 {
-            self.0[part][lane] = from.0[part][lane];
+            self.0[part].0[lane] = turn[part];
         }
     }
 
-    /// One of them, which must be of length 1.
     #[inline(always)]
-    pub(super) fn quaternion(&self, lane: usize) -> DQuat {
-        let [w, x, y, z] = self.0;
-        nalgebra::Unit::new_unchecked(Quaternion::new(w[lane], x[lane], y[lane], z[lane]))
+    pub(super) fn get(&self, lane: usize) -> Turn {
+        [self.0[0].0[lane], self.0[1].0[lane], self.0[2].0[lane], self.0[3].0[lane]]
     }
 
+    /// Adds others times a weight; `matrix` is the weight times a rotation, row by row, which turns their axes.
     #[inline(always)]
-    fn towards(mut self, next: &Self, shares: &[f64; TURNED]) -> Self {
-        for part in 0..4 {
-            for lane in 0..TURNED {
-                self.0[part][lane] += (next.0[part][lane] - self.0[part][lane]) * shares[lane];
-            }
-        }
-        self
-    }
-
-    /// Times a weight; `matrix` is the weight times a rotation, which turns the axes.
-    #[inline(always)]
-    pub(super) fn weighted(&self, weight: f64, matrix: &DMat3) -> Self {
-        let [w, x, y, z] = &self.0;
-        let mut out = Self::default();
-        for lane in 0..TURNED {
-            out.0[0][lane] = weight * w[lane];
+    pub(super) fn add_weighted(&mut self, other: &Self, weight: &F64x16, matrix: &[F64x16; 9]) {
+        let [w, x, y, z] = &other.0;
+        for lane in 0..LANES {
+            self.0[0].0[lane] += weight.0[lane] * w.0[lane];
         }
         for row in 0..3 {
-            for lane in 0..TURNED {
-                let [a, b] = [matrix[(row, 0)] * x[lane], matrix[(row, 1)] * y[lane]];
-                out.0[row + 1][lane] = a + b + matrix[(row, 2)] * z[lane];
+            let [a, b, c] = [&matrix[3 * row], &matrix[3 * row + 1], &matrix[3 * row + 2]];
+            for lane in 0..LANES {
+                let across = a.0[lane] * x.0[lane] + b.0[lane] * y.0[lane] + c.0[lane] * z.0[lane];
+                self.0[row + 1].0[lane] += across;
             }
-        }
-        out
-    }
-
-    #[inline(always)]
-    pub(super) fn add(&mut self, other: &Self) {
-        for part in 0..4 {
-            for lane in 0..TURNED {
-                self.0[part][lane] += other.0[part][lane];
-            }
-        }
-    }
-
-    /// Adds a weight of no rotation.
-    #[inline(always)]
-    pub(super) fn add_still(&mut self, weight: f64) {
-        for lane in 0..TURNED {
-            self.0[0][lane] += weight;
         }
     }
 
     /// Their lengths as quaternions.
     #[inline(always)]
-    pub(super) fn sizes(&self) -> [f64; TURNED] {
+    pub(super) fn sizes(&self) -> F64x16 {
         let [w, x, y, z] = &self.0;
-        let mut sizes = [0.0; TURNED];
-        for lane in 0..TURNED {
-            let sine = x[lane] * x[lane] + y[lane] * y[lane] + z[lane] * z[lane];
-            sizes[lane] = (w[lane] * w[lane] + sine).sqrt();
+        let mut sizes = F64x16::ZERO;
+        for lane in 0..LANES {
+            let sine = x.0[lane] * x.0[lane] + y.0[lane] * y.0[lane] + z.0[lane] * z.0[lane];
+            sizes.0[lane] = (w.0[lane] * w.0[lane] + sine).sqrt();
         }
         sizes
     }
 
+    /// Vectors turned by them; they must be of length 1.
     #[inline(always)]
-    pub(super) fn divided(mut self, by: &[f64; TURNED]) -> Self {
-        for part in 0..4 {
-            for lane in 0..TURNED {
-                self.0[part][lane] /= by[lane];
-            }
-        }
-        self
-    }
-
-    /// Vectors, side by side, turned by them; they must be of length 1.
-    #[inline(always)]
-    pub(super) fn rotate(&self, vectors: &[[f64; TURNED]; 3]) -> [[f64; TURNED]; 3] {
+    pub(super) fn rotate(&self, vectors: &[F64x16; 3]) -> [F64x16; 3] {
         let [w, axis @ ..] = &self.0;
         let mut turned = cross_side_by_side(axis, vectors);
-        for part in &mut turned {
-            for lane in 0..TURNED {
-                part[lane] *= 2.0;
+        for part in 0..3 {
+            for lane in 0..LANES {
+                turned[part].0[lane] *= 2.0;
             }
         }
         let across = cross_side_by_side(axis, &turned);
         for part in 0..3 {
-            for lane in 0..TURNED {
-                turned[part][lane] = turned[part][lane] * w[lane] + across[part][lane] + vectors[part][lane];
+            for lane in 0..LANES {
+                turned[part].0[lane] = turned[part].0[lane] * w.0[lane] + across[part].0[lane] + vectors[part].0[lane];
             }
         }
         turned
@@ -138,15 +83,24 @@ impl SegmentTurns {
 }
 
 #[inline(always)]
-fn cross_side_by_side(a: &[[f64; TURNED]; 3], b: &[[f64; TURNED]; 3]) -> [[f64; TURNED]; 3] {
-    let mut out = [[0.0; TURNED]; 3];
+fn cross_side_by_side(a: &[F64x16; 3], b: &[F64x16; 3]) -> [F64x16; 3] {
+    let mut out = [F64x16::ZERO; 3];
     for axis in 0..3 {
         let (y, z) = ((axis + 1) % 3, (axis + 2) % 3);
-        for lane in 0..TURNED {
-            out[axis][lane] = a[y][lane] * b[z][lane] - a[z][lane] * b[y][lane];
+        for lane in 0..LANES {
+            out[axis].0[lane] = a[y].0[lane] * b[z].0[lane] - a[z].0[lane] * b[y].0[lane];
         }
     }
     out
+}
+
+/// A segment of a guide.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct GuideSegment {
+    /// Its middle at rest, from 0 at the root to 1 at the tip.
+    middle: f64,
+    /// Its rotation since rest, in the frame of its guide's root.
+    turn: Turn,
 }
 
 /// The rotation of each segment of the guides since rest.
@@ -154,10 +108,7 @@ fn cross_side_by_side(a: &[[f64; TURNED]; 3], b: &[[f64; TURNED]; 3]) -> [[f64; 
 pub struct GuideTurns {
     /// First row of each guide's segments, and the end of the last.
     starts: Vec<u32>,
-    /// For each segment its middle at rest, from 0 at the root to 1 at the tip.
-    middles: Vec<f64>,
-    /// For each segment its rotation, in the frame of its guide's root at rest.
-    turns: Vec<Turn>,
+    segments: Vec<GuideSegment>,
     /// From where the skin carries each root to where it is, in the same frame, metres.
     offsets: Vec<DVec3>,
 }
@@ -183,16 +134,15 @@ impl GuideTurns {
             turns_of(&rest[cvs.clone()], &now[cvs], &pose)
         };
         let found = parallel::tabulate(guides, TASK, one);
-        let mut all = Self {
-            starts: vec![0],
-            middles: segment_middles(starts, rest),
-            turns: Vec::with_capacity(rest.len()),
-            offsets: Vec::with_capacity(guides),
-        };
+        let middles = segment_middles(starts, rest);
+        let mut all =
+            Self { starts: vec![0], segments: Vec::with_capacity(rest.len()), offsets: Vec::with_capacity(guides) };
         for (turns, offset) in found {
-            all.turns.extend(turns);
+            for turn in turns {
+                all.segments.push(GuideSegment { middle: middles[all.segments.len()], turn });
+            }
             all.offsets.push(offset);
-            all.starts.push(all.turns.len() as u32);
+            all.starts.push(all.segments.len() as u32);
         }
         all
     }
@@ -208,25 +158,27 @@ impl GuideTurns {
         &self.offsets[guide]
     }
 
-    /// The rotations at ascending fractions of a guide with segments in these `rows`, interpolated between the middles of
-    /// segments; `at` is the row of the last call for smaller fractions, or the first.
+    /// The rotation at a fraction of a guide, interpolated between the middles of its segments, of which the last is before
+    /// row `end`; `at` is the row of the last call for a smaller fraction, or the first.
     #[inline(always)]
-    pub(super) fn at(&self, rows: &Range<usize>, fractions: &[f64], at: &mut usize) -> SegmentTurns {
-        let (mut here, mut next, mut shares) = (SegmentTurns::default(), SegmentTurns::default(), [0.0; TURNED]);
-        let middles = &self.middles[..rows.end];
-        for (lane, u) in fractions.iter().enumerate() {
-            while *at + 1 < rows.end && middles[*at + 1] <= *u {
-                *at += 1;
+    pub(super) fn at(&self, fraction: f64, at: &mut usize, end: usize) -> Turn {
+        let segments = &self.segments[*at..end];
+        let mut here = &segments[0];
+        for next in &segments[1..] {
+            if next.middle <= fraction {
+                (here, *at) = (next, *at + 1);
+                continue;
             }
-            let is_between = *at + 1 < rows.end && *u > middles[*at];
-            let after = *at + usize::from(is_between);
-            if is_between {
-                shares[lane] = (u - middles[*at]) / (middles[after] - middles[*at]);
+            let mut turn = here.turn;
+            if fraction > here.middle {
+                let share = (fraction - here.middle) / (next.middle - here.middle);
+                for part in 0..4 {
+                    turn[part] += (next.turn[part] - turn[part]) * share;
+                }
             }
-            here.put(lane, &self.turns[*at]);
-            next.put(lane, &self.turns[after]);
+            return turn;
         }
-        here.towards(&next, &shares)
+        here.turn
     }
 }
 
@@ -244,7 +196,7 @@ fn turns_of(rest: &[[f32; 3]], now: &[[f32; 3]], pose: &RootPose) -> (Vec<Turn>,
             turn = smallest_rotation(&(rotated(&turn, &from)), &(back * to)) * turn;
             turn /= turn.norm();
         }
-        turns.push(Turn { w: turn.w, v: turn.imag() });
+        turns.push([turn.w, turn.i, turn.j, turn.k]);
     }
     (turns, offset)
 }

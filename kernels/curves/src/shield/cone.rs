@@ -15,7 +15,7 @@
 
 use super::rays::{Seen, beside};
 use super::views::View;
-use super::{Obstacle, Reach};
+use super::{Fade, Obstacle, Reach};
 use numerics::lanes::{F32x16, LANES, Lanes, get};
 use numerics::simd::kernel;
 use numerics::tree::{Boxes, Region};
@@ -42,17 +42,18 @@ kernel! {
     pub(super) fn cover(
         obstacles: &[Obstacle],
         views: &[View],
-        reach: Reach,
+        fade: Option<Fade>,
         cone: f32,
         covered: &mut [f32],
     ) = body;
 }
 
 #[inline(always)]
-fn body(obstacles: &[Obstacle], views: &[View], reach: Reach, cone: f32, covered: &mut [f32]) {
+fn body(obstacles: &[Obstacle], views: &[View], fade: Option<Fade>, cone: f32, covered: &mut [f32]) {
     let (sine, cosine) = trig::sin_cos(cone);
     for (view, covered) in views.iter().zip(covered) {
         let mut sums = [F32x16::splat(0.0); 2];
+        let reach = Reach { end: view.reach, fade };
         for obstacle in obstacles {
             let gap = view.gap.at(obstacle.size);
             let cone = Cone { at: view.at, slope: sine / cosine, reach, farthest: reach.farthest(), gap };

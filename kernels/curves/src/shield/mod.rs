@@ -24,6 +24,7 @@ use edges::Edges;
 pub use edges::Neighbours;
 use frame::Frame;
 use numerics::lanes::{F32x16, LANES, get};
+use numerics::masked::Masked;
 use numerics::parallel;
 use numerics::simd::Path;
 use numerics::tree::{Block, TriangleTree};
@@ -53,11 +54,11 @@ impl<'a> Collider<'a> {
 
 /// How shelter is measured.
 #[derive(Clone, Copy, Debug)]
-pub struct Shield {
+pub struct Shield<'a> {
     /// Direction that the wind blows towards, of any length; nothing is sheltered from a wind of 0.
     pub wind: [f64; 3],
-    /// Largest distance upwind at which a collider shelters a CV, metres.
-    pub offset: f32,
+    /// Largest distance upwind at which a collider shelters a CV, metres; a mask has one value for each CV.
+    pub offset: Masked<'a, f32>,
     /// A hit at a distance s counts max(0, 1 − s ÷ distance) to the power of `falloff`; 0: it counts 1 at any.
     pub distance: f32,
     /// See `distance`; 0 or more.
@@ -135,7 +136,7 @@ struct Obstacle {
 ///
 /// # Panics
 /// If `starts` decreases or ends beyond `points`, or a triangle's index is out of range.
-pub fn shield(starts: &[u32], points: &[Vec3], colliders: &[Collider<'_>], shield: &Shield) -> Vec<f32> {
+pub fn shield(starts: &[u32], points: &[Vec3], colliders: &[Collider<'_>], shield: &Shield<'_>) -> Vec<f32> {
     shield_on(Path::chosen(), starts, points, colliders, shield)
 }
 
@@ -143,10 +144,16 @@ pub fn shield(starts: &[u32], points: &[Vec3], colliders: &[Collider<'_>], shiel
 ///
 /// # Panics
 /// As [`shield()`].
-pub fn shield_on(path: Path, starts: &[u32], points: &[Vec3], colliders: &[Collider<'_>], shield: &Shield) -> Vec<f32> {
+pub fn shield_on(
+    path: Path,
+    starts: &[u32],
+    points: &[Vec3],
+    colliders: &[Collider<'_>],
+    shield: &Shield<'_>,
+) -> Vec<f32> {
     let curves = starts.len().saturating_sub(1);
     let Some(frame) = Frame::of(shield.wind, points, colliders) else { return vec![0.0; curves] };
-    let reach = frame.length(shield.offset);
+    let reach = frame.length(shield.offset.value);
     if curves == 0 || reach.is_nan() || reach <= 0.0 {
         return vec![0.0; curves];
     }
@@ -156,10 +163,8 @@ pub fn shield_on(path: Path, starts: &[u32], points: &[Vec3], colliders: &[Colli
     let mut left = shares.as_mut_slice();
     let mut batches = batches(starts).into_iter();
     let first = batches.next().map(|batch| &starts[batch]).unwrap_or_default();
-    let (obstacles, mut views) = rayon::join(
-        || colliders.iter().map(obstacle).collect::<Vec<_>>(),
-        || Views::of(&frame, first, points, shield.skin_gap),
-    );
+    let (obstacles, mut views) =
+        rayon::join(|| colliders.iter().map(obstacle).collect::<Vec<_>>(), || Views::of(&frame, first, points, shield));
     if obstacles.iter().all(|obstacle| obstacle.tree.is_empty()) {
         return vec![0.0; curves];
     }
@@ -168,11 +173,11 @@ pub fn shield_on(path: Path, starts: &[u32], points: &[Vec3], colliders: &[Colli
         parallel::for_each(tasks, |_, (covered, views)| {
             for (covered, views) in covered.chunks_mut(LANES).zip(views.chunks(LANES)) {
                 if shield.cone > 0.0 {
-                    cone::cover(path, &obstacles, views, Reach { end: reach, fade }, shield.cone, covered);
+                    cone::cover(path, &obstacles, views, fade, shield.cone, covered);
                 } else if let Some(fade) = fade {
-                    rays::cover_nearest(path, &obstacles, views, reach, fade, covered);
+                    rays::cover_nearest(path, &obstacles, views, fade, covered);
                 } else {
-                    rays::cover(path, &obstacles, views, reach, covered);
+                    rays::cover(path, &obstacles, views, covered);
                 }
             }
         });
@@ -186,7 +191,7 @@ pub fn shield_on(path: Path, starts: &[u32], points: &[Vec3], colliders: &[Colli
         parallel::fill(mine, TASK_CURVES, |curve| share(views.of_curve(curve), &covered));
         left = rest;
         let Some(batch) = batches.next() else { return shares };
-        views = Views::of(&frame, &starts[batch], points, shield.skin_gap);
+        views = Views::of(&frame, &starts[batch], points, shield);
     }
 }
 

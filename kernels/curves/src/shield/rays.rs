@@ -8,29 +8,27 @@ use numerics::tree::Cuboid;
 use numerics::vector::{Vec3, sub};
 
 kernel! {
-    /// Sets `covered` to 1 for each of up to sixteen CVs that has a collider within `reach` upwind.
+    /// Sets `covered` to 1 for each of up to sixteen CVs that has a collider within its reach upwind.
     pub(super) fn cover(
         obstacles: &[Obstacle],
         views: &[View],
-        reach: f32,
         covered: &mut [f32],
     ) = body;
 }
 
 kernel! {
-    /// Sets `covered` for each of up to sixteen CVs to how much the nearest collider within `reach` upwind counts.
+    /// Sets `covered` for each of up to sixteen CVs to how much the nearest collider within its reach upwind counts.
     pub(super) fn cover_nearest(
         obstacles: &[Obstacle],
         views: &[View],
-        reach: f32,
         fade: Fade,
         covered: &mut [f32],
     ) = body_of_nearest;
 }
 
 #[inline(always)]
-fn body(obstacles: &[Obstacle], views: &[View], reach: f32, covered: &mut [f32]) {
-    let mut rays = Rays::of(views, reach);
+fn body(obstacles: &[Obstacle], views: &[View], covered: &mut [f32]) {
+    let mut rays = Rays::of(views, None);
     let mut hit = [0; LANES];
     for obstacle in obstacles {
         rays.set_gaps(views, obstacle);
@@ -44,8 +42,8 @@ fn body(obstacles: &[Obstacle], views: &[View], reach: f32, covered: &mut [f32])
 }
 
 #[inline(always)]
-fn body_of_nearest(obstacles: &[Obstacle], views: &[View], reach: f32, fade: Fade, covered: &mut [f32]) {
-    let mut rays = Rays::of(views, Reach { end: reach, fade: Some(fade) }.farthest());
+fn body_of_nearest(obstacles: &[Obstacle], views: &[View], fade: Fade, covered: &mut [f32]) {
+    let mut rays = Rays::of(views, Some(fade));
     let mut nearest = F32x16::splat(f32::INFINITY);
     for obstacle in obstacles {
         rays.set_gaps(views, obstacle);
@@ -66,16 +64,23 @@ fn of_lane(views: &[View], lane: usize) -> &View {
 struct Rays {
     at: Lanes<3>,
     gap: F32x16,
-    reach: f32,
+    /// Beyond these distances nothing counts, and the largest of them.
+    reach: F32x16,
+    farthest: f32,
 }
 
 impl Rays {
     /// The rays of up to sixteen CVs; a lane without a CV repeats the first.
     #[inline(always)]
-    fn of(views: &[View], reach: f32) -> Self {
-        let mut rays = Self { at: [F32x16::splat(0.0); 3], gap: F32x16::splat(0.0), reach };
+    fn of(views: &[View], fade: Option<Fade>) -> Self {
+        let zero = F32x16::splat(0.0);
+        let mut rays = Self { at: [zero; 3], gap: zero, reach: zero, farthest: 0.0 };
         for lane in 0..LANES {
-            set(&mut rays.at, lane, of_lane(views, lane).at);
+            let view = of_lane(views, lane);
+            set(&mut rays.at, lane, view.at);
+            let reach = Reach { end: view.reach, fade }.farthest();
+            rays.reach.0[lane] = reach;
+            rays.farthest = if reach > rays.farthest { reach } else { rays.farthest };
         }
         rays
     }
@@ -91,7 +96,7 @@ impl Rays {
     #[inline(always)]
     fn swept(&self) -> Cuboid {
         let Cuboid { low, high } = self.bounds();
-        Cuboid { low, high: [high[0], high[1], high[2] + self.reach] }
+        Cuboid { low, high: [high[0], high[1], high[2] + self.farthest] }
     }
 
     /// Lowers `nearest` to the distance at which each ray meets the tree.
@@ -107,7 +112,7 @@ impl Rays {
                     let at = get(&self.at, lane);
                     let seen = Seen::from([a, b, c].map(|corner| sub(get(corner, triangle), at)));
                     let far = seen.towards > self.gap.0[lane] * areas.0[triangle];
-                    let near = seen.towards <= self.reach * seen.across;
+                    let near = seen.towards <= self.reach.0[lane] * seen.across;
                     let distance = seen.towards / seen.across;
                     let closer = seen.inside & far & near & (distance < nearest.0[lane]);
                     nearest.0[lane] = if closer { distance } else { nearest.0[lane] };
@@ -147,7 +152,7 @@ impl Rays {
             let at = get(&self.at, lane);
             let seen = Seen::from([sub(a, at), sub(b, at), sub(c, at)]);
             let far = seen.towards > self.gap.0[lane] * area;
-            let near = seen.towards <= self.reach * seen.across;
+            let near = seen.towards <= self.reach.0[lane] * seen.across;
             hit[lane] |= u32::from(seen.inside & far & near);
         }
     }

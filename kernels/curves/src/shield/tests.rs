@@ -16,11 +16,17 @@ fn lone(points: &[Vec3]) -> Vec<u32> {
     (0..=points.len() as u32).collect()
 }
 
-const STILL: Shield =
-    Shield { wind: [1.0, 0.0, 0.0], offset: 10.0, distance: 0.0, falloff: 1.0, cone: 0.0, skin_gap: 0.0 };
+pub(super) const STILL: Shield<'static> = Shield {
+    wind: [1.0, 0.0, 0.0],
+    offset: Masked::uniform(10.0),
+    distance: 0.0,
+    falloff: 1.0,
+    cone: 0.0,
+    skin_gap: 0.0,
+};
 
 /// The result for each point as a curve of one CV.
-fn shares(points: &[Vec3], mesh: &(Vec<Vec3>, Vec<[u32; 3]>), how: &Shield) -> Vec<f32> {
+fn shares(points: &[Vec3], mesh: &(Vec<Vec3>, Vec<[u32; 3]>), how: &Shield<'_>) -> Vec<f32> {
     shield(&lone(points), points, &[Collider::of(&mesh.0, &mesh.1)], how)
 }
 
@@ -35,10 +41,36 @@ fn half_a_curve_behind_a_wall_is_half_sheltered() {
     let (wall, triangles) = wall(0.0);
     let colliders = [Collider::of(&wall, &triangles)];
     assert_eq!(shield(&[0, 4, 5], &points, &colliders, &STILL), [0.5, 0.0]);
-    assert_eq!(shield(&[0, 4, 5], &points, &colliders, &Shield { offset: 0.49, ..STILL }), [0.0, 0.0]);
+    assert_eq!(shield(&[0, 4, 5], &points, &colliders, &Shield { offset: 0.49.into(), ..STILL }), [0.0, 0.0]);
     assert_eq!(shield(&[0, 4, 5], &points, &colliders, &Shield { wind: [-3.0, 0.0, 0.0], ..STILL }), [0.0, 1.0]);
     assert_eq!(shield(&[0, 4, 5], &points, &[], &STILL), [0.0, 0.0]);
-    assert_eq!(shield(&[0, 4, 5], &points, &colliders, &Shield { offset: 0.0, ..STILL }), [0.0, 0.0]);
+    assert_eq!(shield(&[0, 4, 5], &points, &colliders, &Shield { offset: 0.0.into(), ..STILL }), [0.0, 0.0]);
+}
+
+/// Each CV looks as far as its own mask says, along a line, through a cone, and where shelter fades.
+#[test]
+fn a_mask_of_the_offset_is_each_cvs_own() {
+    let (wall, triangles) = wall(0.0);
+    let colliders = [Collider::of(&wall, &triangles)];
+    // Rows of CVs 0.5, 1 and 1.5 m behind the wall, near the middle of it.
+    let at = |k: usize| [0.5 + 0.5 * (k % 3) as f32, 0.01 * k as f32 - 0.1, 0.02];
+    let points: Vec<Vec3> = (0..24).map(at).collect();
+    let mask: Vec<f32> = (0..24).map(|k| [0.0, 0.07, 0.12, -1.0, f32::NAN, 0.16][k / 4]).collect();
+    for (cone, distance) in [(0.0, 0.0), (0.0, 4.0), (0.05, 0.0), (0.05, 4.0)] {
+        let how = Shield { cone, distance, ..STILL };
+        let found = shield(
+            &lone(&points),
+            &points,
+            &colliders,
+            &Shield { offset: Masked { value: 10.0, mask: Some(&mask) }, ..how },
+        );
+        for k in 0..24 {
+            let offset = Masked::uniform(10.0 * mask[k]);
+            let alone = shield(&[0, 1], &points[k..=k], &colliders, &Shield { offset, ..how });
+            assert!((found[k] - alone[0]).abs() < 1e-5, "{k}: {} {}", found[k], alone[0]);
+            assert_eq!(found[k] > 0.0, 10.0 * mask[k] > points[k][0], "{k}");
+        }
+    }
 }
 
 #[test]
@@ -58,7 +90,7 @@ fn a_sphere_shelters_its_silhouette_at_any_offset() {
     let points: Vec<Vec3> =
         (0..4000u64).map(|i| [0, 1, 2].map(|axis| Key::new(1).of(i).of(axis).f32() * 5.0 - 2.5)).collect();
     for offset in [0.2, 1.0, 3.0, 10.0, 1e4] {
-        let found = shares(&points, &mesh, &Shield { offset, ..STILL });
+        let found = shares(&points, &mesh, &Shield { offset: offset.into(), ..STILL });
         let mut sure = 0;
         for (point, found) in points.iter().zip(found) {
             let [x, y, z] = point.map(f64::from);
@@ -172,13 +204,14 @@ fn shelter_is_the_same_at_any_scale_and_far_from_the_origin() {
         (0..600u64).map(|i| [0, 1, 2].map(|axis| Key::new(5).of(i).of(axis).f32() * 3.0 - 1.5)).collect();
     let starts: Vec<u32> = (0..=120).map(|curve| 5 * curve).collect();
     for cone in [0.0, 0.1] {
-        let how = Shield { wind: [0.5, 0.4, 0.8], offset: 8.0, distance: 0.0, falloff: 1.0, cone, skin_gap: 0.0 };
+        let how =
+            Shield { wind: [0.5, 0.4, 0.8], offset: 8.0.into(), distance: 0.0, falloff: 1.0, cone, skin_gap: 0.0 };
         let expected = shield(&starts, &curves, &[Collider::of(&points, &triangles)], &how);
         for power in [-40, -10, 20, 100] {
             let scale = libm::scalbnf(1.0, power);
             let [points, curves] =
                 [&points, &curves].map(|all| -> Vec<Vec3> { all.iter().map(|p| p.map(|x| x * scale)).collect() });
-            let how = Shield { offset: how.offset * scale, ..how };
+            let how = Shield { offset: how.offset.map(|offset| offset * scale), ..how };
             let found = shield(&starts, &curves, &[Collider::of(&points, &triangles)], &how);
             assert_eq!(found, expected, "{scale}");
         }
@@ -194,7 +227,7 @@ fn any_input_gives_a_fraction() {
         for (offset, distance) in
             [(1e-45, 0.0), (10.0, 0.0), (f32::MAX, 0.0), (10.0, 1e-45), (f32::MAX, f32::MAX), (10.0, 0.7)]
         {
-            let how = Shield { offset, distance, falloff: distance, cone, ..STILL };
+            let how = Shield { offset: offset.into(), distance, falloff: distance, cone, ..STILL };
             for mesh in [wall.clone(), vec![[0.0; 3]; 4], vec![[f32::NAN; 3]; 4], vec![[3e38, -3e38, 3e38]; 4]] {
                 let colliders = [Collider::of(&mesh, &triangles)];
                 let found = shield(&[0, 3, 3, 5], &points, &colliders, &how);
@@ -262,7 +295,7 @@ mod cones {
             let radius = slope * ((f64::from(k) + 0.5) / f64::from(n)).sqrt();
             let angle = 2.399_963 * f64::from(k);
             let wind = [1.0, radius * libm::cos(angle), radius * libm::sin(angle)];
-            met += shares(&[p], mesh, &Shield { wind, offset: 100.0, ..STILL })[0];
+            met += shares(&[p], mesh, &Shield { wind, offset: 100.0.into(), ..STILL })[0];
         }
         met / n as f32
     }
@@ -282,7 +315,7 @@ mod cones {
             [-3.0, 0.0, 0.0],
         ] {
             for cone in [0.02_f32, 0.1, 0.3] {
-                let how = Shield { offset: 1e6, cone, ..STILL };
+                let how = Shield { offset: 1e6.into(), cone, ..STILL };
                 let (found, expected) = (shares(&[p], &mesh, &how)[0], sampled(p, &mesh, f64::from(cone)));
                 assert!((found - expected).abs() < 3e-3, "{p:?}, {cone}: {found}, expected {expected}");
             }
@@ -295,7 +328,7 @@ mod cones {
         let turned: Vec<[u32; 3]> = triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
         let loose: Vec<Vec3> = triangles.iter().flatten().map(|point| points[*point as usize]).collect();
         for mesh in [(points.clone(), triangles), (points, turned), (loose, vec![[0, 1, 2], [3, 4, 5]])] {
-            let how = Shield { cone: 0.1, offset: 1e6, ..STILL };
+            let how = Shield { cone: 0.1, offset: 1e6.into(), ..STILL };
             let slope = libm::tan(0.1) as f32;
             // At the edge; half a radius inside (1 − 0.1955); a quarter at the corner; fully covered, and not at all.
             let at = |y: f32, z: f32| shares(&[[2.0, y, z]], &mesh, &how)[0];

@@ -3,6 +3,7 @@
 //! Curves may lie in memory in any order and may be long, so CVs are sorted instead of curves: into the cells of a grid
 //! across the wind, along a Z-order curve, in two passes.
 
+use super::Shield;
 use super::frame::{Frame, Gap};
 use numerics::parallel;
 use numerics::vector::Vec3;
@@ -12,6 +13,8 @@ use numerics::vector::Vec3;
 pub(super) struct View {
     pub(super) at: Vec3,
     pub(super) gap: Gap,
+    /// Largest distance upwind at which a collider shelters it; 0 or less: at none.
+    pub(super) reach: f32,
 }
 
 /// The CVs of some curves.
@@ -37,22 +40,22 @@ const FINEST: u32 = 8;
 
 impl Views {
     /// The CVs `points[starts[i]..starts[i + 1]]`.
-    pub(super) fn of(frame: &Frame, starts: &[u32], points: &[Vec3], skin_gap: f32) -> Self {
+    pub(super) fn of(frame: &Frame, starts: &[u32], points: &[Vec3], shield: &Shield<'_>) -> Self {
         let Some(base) = starts.first().copied() else {
             return Self { sorted: Vec::new(), order: Vec::new(), starts: vec![0] };
         };
         let points = &points[base as usize..starts[starts.len() - 1] as usize];
         let starts: Vec<u32> = starts.iter().map(|start| start - base).collect();
-        let still = View { at: [0.0; 3], gap: Gap::default() };
+        let still = View { at: [0.0; 3], gap: Gap::default(), reach: 0.0 };
         let mut views = vec![still; points.len()];
         let tasks = split(&mut views, &starts);
         parallel::for_each(tasks, |_, (curves, mut views)| {
             for ends in curves.windows(2) {
                 let cvs = &points[ends[0] as usize..ends[1] as usize];
-                let gap = frame.gap(cvs, skin_gap);
+                let gap = frame.gap(cvs, shield.skin_gap);
                 let (mine, rest) = views.split_at_mut(cvs.len());
-                for (view, cv) in mine.iter_mut().zip(cvs) {
-                    *view = View { at: frame.at(*cv), gap };
+                for ((view, cv), row) in mine.iter_mut().zip(cvs).zip((base + ends[0]) as usize..) {
+                    *view = View { at: frame.at(*cv), gap, reach: frame.length(shield.offset.at(row)) };
                 }
                 views = rest;
             }
@@ -169,6 +172,7 @@ fn spread(x: u32) -> u32 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::STILL;
     use super::*;
 
     #[test]
@@ -177,7 +181,7 @@ mod tests {
         let along = [5, 2, 7, 0, 3, 6, 1, 4];
         let points: Vec<Vec3> = along.iter().map(|k| [0.0, *k as f32, 0.0]).collect();
         let frame = Frame::of([0.0, 0.0, 1.0], &points, &[]).unwrap();
-        let views = Views::of(&frame, &[0, 3, 8], &points, 0.0);
+        let views = Views::of(&frame, &[0, 3, 8], &points, &STILL);
         let at = |index: &u32| views.sorted()[*index as usize].at;
         let found: Vec<Vec3> = (0..views.curves()).flat_map(|curve| views.of_curve(curve)).map(at).collect();
         assert_eq!(found, points.iter().map(|point| frame.at(*point)).collect::<Vec<_>>());
@@ -194,7 +198,7 @@ mod tests {
         let frame = Frame::of([0.0, 0.0, 1.0], &points, &[]).unwrap();
         for n in 0..=4 {
             let starts: Vec<u32> = (0..=n).collect();
-            assert_eq!(Views::of(&frame, &starts, &points, 0.0).sorted().len(), n as usize);
+            assert_eq!(Views::of(&frame, &starts, &points, &STILL).sorted().len(), n as usize);
         }
     }
 }

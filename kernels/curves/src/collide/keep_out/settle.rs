@@ -1,13 +1,12 @@
 //! Curves that enter the skin, blended with a shape in which they are free.
 
-use super::super::crossing::add_crossings;
+use super::super::crossing::crosses_block;
 use super::super::half_space::HalfSpace;
 use super::super::perpendicular;
 use super::super::segment_turn::{Nearby, gather};
 use super::{is_free, rounding_of, tested_start};
-use numerics::lanes::{LANES, get, set};
 use numerics::simd::kernel;
-use numerics::tree::{Block, TriangleTree};
+use numerics::tree::{Boxes, Cuboid, Region, TriangleTree};
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 use std::ops::Range;
 
@@ -47,7 +46,7 @@ fn settle_task(
     let mut out = entered.free[entered.starts[curves.start] as usize..entered.starts[curves.end] as usize].to_vec();
     let (base, untested) = (entered.starts[curves.start] as usize, entered.untested);
     let (mut nearby, mut faces) = (Nearby::default(), Faces::default());
-    let (mut pose, mut turns) = (Vec::new(), Vec::new());
+    let (mut pose, mut turns, mut swept) = (Vec::new(), Vec::new(), Vec::new());
     for curve in curves {
         let cvs = entered.starts[curve] as usize..entered.starts[curve + 1] as usize;
         let [rest, goal, free] = [entered.rest, entered.goal, entered.free].map(|points| &points[cvs.clone()]);
@@ -58,15 +57,14 @@ fn settle_task(
         // No closures here: they are not compiled for the kernel's path.
         let outside = tested_start(rest, untested);
         turns_between(goal, free, &mut turns);
-        let (low, high) = bounds(goal[0], &turns, outside);
-        gather(&[skin], low, high, &mut nearby);
-        faces.pack(&nearby);
+        sweeps(goal[0], &turns, outside, &mut swept);
+        faces.gather(&swept, skin, &mut nearby);
         let (mut crossing, mut clear, mut suspect) = (0.0, 1.0, 0);
         for _ in 0..HALVINGS {
             let share = 0.5 * (crossing + clear);
             pose_at(goal[0], &turns, share, &mut pose);
             let ends = [outside, tested_start(&pose, untested)];
-            if faces.crossed(&pose, ends, known[curve].as_ref(), &mut suspect) {
+            if faces.crossed(&nearby, &pose, ends, known[curve].as_ref(), &mut suspect) {
                 crossing = share;
             } else {
                 clear = share;
@@ -77,44 +75,40 @@ fn settle_task(
     out
 }
 
-/// Faces near a curve in all its poses: blocks of those alone, with their boxes.
+/// Which faces each segment of a curve may cross in all poses of the curve.
 #[derive(Default)]
 struct Faces {
-    blocks: Vec<Block>,
-    boxes: Vec<(Vec3, Vec3)>,
-    /// Number of faces.
-    count: usize,
+    /// The boxes of the faces of each nearby block.
+    boxes: Vec<Boxes>,
+    /// The blocks that the segments may cross, one segment after another, and the lanes of the faces that it may.
+    met: Vec<(usize, u16)>,
+    /// The end of each segment's.
+    ends: Vec<usize>,
 }
 
 impl Faces {
+    /// Finds them for segments that sweep these boxes.
     #[inline(always)]
-    fn pack(&mut self, nearby: &Nearby<'_>) {
-        self.count = 0;
+    fn gather<'t>(&mut self, swept: &[Cuboid], skin: &'t TriangleTree, nearby: &mut Nearby<'t>) {
+        let mut all = swept[0];
+        for one in swept {
+            all = around(all, one);
+        }
+        gather(&[skin], all.low, all.high, nearby);
         self.boxes.clear();
-        for (block, lanes) in nearby {
-            let mut lanes = *lanes;
-            while lanes != 0 {
-                let from = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
-                let (to, lane) = (self.count / LANES, self.count % LANES);
-                self.count += 1;
-                if to == self.blocks.len() {
-                    self.blocks.push(Block { corners: block.corners, triangle: block.triangle });
-                }
-                if lane == 0 {
-                    self.boxes.push(([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]));
-                }
-                self.blocks[to].triangle[lane] = block.triangle[from];
-                let (low, high) = &mut self.boxes[to];
-                for corner in 0..3 {
-                    let at = get(&block.corners[corner], from);
-                    set(&mut self.blocks[to].corners[corner], lane, at);
-                    for axis in 0..3 {
-                        low[axis] = low[axis].min(at[axis]);
-                        high[axis] = high[axis].max(at[axis]);
-                    }
+        for (block, _) in nearby.iter() {
+            self.boxes.push(block.boxes());
+        }
+        self.met.clear();
+        self.ends.clear();
+        for one in swept {
+            for k in 0..nearby.len() {
+                let lanes = nearby[k].1 & one.meeting(&self.boxes[k]);
+                if lanes != 0 {
+                    self.met.push((k, lanes));
                 }
             }
+            self.ends.push(self.met.len());
         }
     }
 
@@ -122,6 +116,7 @@ impl Faces {
     #[inline(always)]
     fn crossed(
         &self,
+        nearby: &Nearby<'_>,
         cvs: &[Vec3],
         [outside, start]: [Option<Vec3>; 2],
         known: Option<&(&HalfSpace, DVec3)>,
@@ -137,14 +132,14 @@ impl Faces {
             {
                 continue;
             }
-            if self.meets(from, cvs[k + 1]) {
+            if self.meets(nearby, k, from, cvs[k + 1]) {
                 *suspect = k;
                 return true;
             }
             if k == 0
                 && let Some(outside) = outside
                 && outside != from
-                && self.meets(outside, from)
+                && self.meets(nearby, 0, outside, from)
             {
                 *suspect = 0;
                 return true;
@@ -153,51 +148,55 @@ impl Faces {
         false
     }
 
-    /// Whether one of them crosses the segment from `a` to `b`.
+    /// Whether one of those of segment `k` crosses the segment from `a` to `b`, a part of it.
     #[inline(always)]
-    fn meets(&self, a: Vec3, b: Vec3) -> bool {
-        let (mut left, mut first) = (self.count, None);
-        for (block, (low, high)) in self.blocks.iter().zip(&self.boxes) {
-            let lanes = if left >= LANES { u16::MAX } else { (1 << left) - 1 };
-            left -= LANES.min(left);
-            let mut meets = true;
-            for axis in 0..3 {
-                meets &= a[axis].min(b[axis]) <= high[axis] && a[axis].max(b[axis]) >= low[axis];
-            }
-            if meets {
-                add_crossings(block, lanes, a, b, &mut first);
-                if first.is_some() {
-                    return true;
-                }
+    fn meets(&self, nearby: &Nearby<'_>, k: usize, a: Vec3, b: Vec3) -> bool {
+        let first = if k == 0 { 0 } else { self.ends[k - 1] };
+        for (block, lanes) in &self.met[first..self.ends[k]] {
+            if crosses_block(nearby[*block].0, &self.boxes[*block], *lanes, a, b) {
+                return true;
             }
         }
         false
     }
 }
 
-/// Bounds of a curve from `root` in all poses of its turns, and of `outside`.
+/// The box around two.
 #[inline(always)]
-fn bounds(root: Vec3, turns: &[SegmentTurn], outside: Option<Vec3>) -> (Vec3, Vec3) {
+fn around(mut a: Cuboid, b: &Cuboid) -> Cuboid {
+    for axis in 0..3 {
+        a.low[axis] = a.low[axis].min(b.low[axis]);
+        a.high[axis] = a.high[axis].max(b.high[axis]);
+    }
+    a
+}
+
+/// The box that each segment of a curve from `root` sweeps in all poses of its turns; the first with `outside`.
+#[inline(always)]
+fn sweeps(root: Vec3, turns: &[SegmentTurn], outside: Option<Vec3>, swept: &mut Vec<Cuboid>) {
+    swept.clear();
     let (mut low, mut high) = (to_f64(root), to_f64(root));
-    let (mut all_low, mut all_high) = (low, high);
+    if let Some(outside) = outside {
+        (low, high) = (low.inf(&to_f64(outside)), high.sup(&to_f64(outside)));
+    }
     for turn in turns {
         let (sine, cosine) = libm::sincos(turn.angle);
         let to = turn.from * cosine + turn.side * sine;
         // The arc is at most this far from its chord.
         let bulge = 1.0 - libm::cos(0.5 * turn.angle);
+        let (start_low, start_high) = (low, high);
+        if swept.is_empty() {
+            (low, high) = (to_f64(root), to_f64(root));
+        }
         for axis in 0..3 {
             low[axis] += turn.length * (turn.from[axis].min(to[axis]) - bulge);
             high[axis] += turn.length * (turn.from[axis].max(to[axis]) + bulge);
-            all_low[axis] = all_low[axis].min(low[axis]);
-            all_high[axis] = all_high[axis].max(high[axis]);
         }
+        let (all_low, all_high) = (low.inf(&start_low), high.sup(&start_high));
+        // Positions are rounded, those of a pose one after the other.
+        let slack = turns.len() as f64 * rounding_of(to_f32(all_low), to_f32(all_high));
+        swept.push(Cuboid { low: to_f32(all_low.map(|x| x - slack)), high: to_f32(all_high.map(|x| x + slack)) });
     }
-    if let Some(outside) = outside {
-        (all_low, all_high) = (all_low.inf(&to_f64(outside)), all_high.sup(&to_f64(outside)));
-    }
-    // Positions are rounded, those of a pose one after the other.
-    let slack = turns.len() as f64 * rounding_of(to_f32(all_low), to_f32(all_high));
-    (to_f32(all_low.map(|x| x - slack)), to_f32(all_high.map(|x| x + slack)))
 }
 
 /// The turn of a segment in its plane.

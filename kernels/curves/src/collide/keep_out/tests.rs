@@ -92,11 +92,24 @@ fn half_spaces_change_no_bit() {
     assert!(clearance.half_spaces.get().is_none());
     let second = kept(&mesh, &starts, &rest, &goal, &clearance);
     let known = clearance.half_spaces.get().expect("found at the second use");
-    let free = |hair: &usize| {
-        let cvs = &goal[hair * CVS as usize..][..CVS as usize];
-        known[*hair].clears_curve(&to_f64(rest[hair * CVS as usize]), cvs, 5e-4)
-    };
-    assert!((0..600).filter(free).count() > 300, "most hairs are free without a query");
+    let of = |hair: usize| hair * CVS as usize..(hair + 1) * CVS as usize;
+    let free = |hair: usize| known[hair].clears_curve(&to_f64(rest[of(hair).start]), &goal[of(hair)], 5e-4);
+    assert!((0..600).filter(|hair| free(*hair)).count() > 300, "most hairs are free without a query");
+    // Sixteen at a time, of fewer CVs on every third lane, and none on the last.
+    for first in (0..600).step_by(15) {
+        let mut lanes = ClearLanes::none();
+        let cvs = |lane: usize| if lane.is_multiple_of(3) { 3 } else { CVS as usize };
+        for lane in 0..15 {
+            let root = of(first + lane).start;
+            lanes.put(lane, [root, cvs(lane)], &known[first + lane], &to_f64(rest[root]), 5e-4);
+        }
+        let expected = (0..15).fold(0, |mask, lane| {
+            let (hair, root) = (first + lane, of(first + lane).start);
+            let clears = known[hair].clears_curve(&to_f64(rest[root]), &goal[root..root + cvs(lane)], 5e-4);
+            mask | u16::from(clears) << lane
+        });
+        assert_eq!(lanes.clear(&goal), expected);
+    }
     assert_eq!(first, second);
     for path in Path::all() {
         let mut points = goal.clone();
