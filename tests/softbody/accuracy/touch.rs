@@ -191,7 +191,7 @@ pub(super) fn figures() -> Vec<Figure> {
         Figure::error(
             "A cube thrown at the ground, E 2e4 to 2e6 Pa: error of the speed of its rebound, against 256 steps per frame",
             largest(rebounds),
-            0.15,
+            0.1,
             "",
         ),
         Figure::error(
