@@ -190,6 +190,17 @@ metrics! { METRICS:
     ENERGY_LOST = Metric::new("energy_lost", Unit::Joules,
         "Energy that the frame lost in other ways than by `damping`, `drag` and `friction`: by time stepping, by contacts \
          and by `bounce`. More `substeps` lose less.");
+    LOST_SHARE = Metric::new("lost_share", Unit::None,
+        "`energy_lost` relative to the energy that there was, kinetic and stored. 0 for slow bodies; missing where `bounce` \
+         is 0.")
+        .warn_above(0.9, "Bodies stop dead at these frames where they would bounce: time steps are too long for what they \
+            hit. Set more `substeps`, or leave that to the solver (`substeps` 0, `integrator` `default`); with `bounce` 0 they \
+            are meant to.");
+    UNCUT_IMPACTS = Metric::new("uncut_impacts", Unit::None,
+        "Time steps in which a body hits something that should have been cut shorter for its bounce, but were not because \
+         the frame took 300 Newton iterations or more.")
+        .warn_above(0.0, "So much is in contact that there is no time for bounces at these frames: bodies lose more speed \
+            than their material would. Set `substeps` to pay for them, or `bounce` to 0 if they need not bounce.");
     VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume relative to the rest volume.")
         .warn_outside(0.9, 1.1, "The bodies lose or gain more than a tenth of their volume. Raise `volume`, or \
             `stiffness`; look for colliders that squeeze them into too small a space.");
@@ -211,7 +222,7 @@ metrics! { METRICS:
         "Particles and points of the surface that are returned inside a closed collider or another body.");
     DEEPEST_PENETRATION = Metric::new("deepest_penetration", Unit::Metres,
         "By how much `deepest_overlap` exceeds `thickness`: how far surfaces went through each other. 0 while what \
-         starts inside is pushed out.")
+         started inside is not out yet.")
         .warn_above(0.0, "Surfaces went through each other. Set more `substeps`, slow the colliders, leave more room \
             between them, or raise `thickness`.");
     JAMMED = Metric::new("jammed", Unit::None,
@@ -220,9 +231,25 @@ metrics! { METRICS:
             as stopped above the ground there, and passes through the body. Keep it higher by 2 `thickness` or more.");
     STARTED_INSIDE = Metric::new("started_inside", Unit::None,
         "Particles that are deeper than `thickness` inside a closed collider, inside another body, or below the ground \
-         when the simulation starts.")
-        .warn_above(0.0, "Bodies start inside a collider, inside each other or below the ground, and are pushed out the \
-            shortest way over 12 frames, which may be the wrong one. Move them apart at `start_frame`.");
+         when the simulation starts. They are pushed out over 12 frames.");
+    STARTED_IN_BODIES = Metric::new("started_in_bodies", Unit::None,
+        "Pairs of bodies that are inside each other when the simulation starts.")
+        .warn_above(0.0, "Bodies start inside each other: {bodies:started_in_bodies_wire} and \
+            {bodies:started_in_bodies_other}, for one. They are pushed apart the shortest way over 12 frames. Move them \
+            apart at `start_frame`.");
+    STARTED_IN_BODIES_WIRE = Metric::new("started_in_bodies_wire", Unit::None,
+        "The wire of one of the first two of these bodies, from 0; −1 if there are none.");
+    STARTED_IN_BODIES_OTHER = Metric::new("started_in_bodies_other", Unit::None,
+        "The wire of the other; −1 if there are none.");
+    STARTED_IN_COLLIDERS = Metric::new("started_in_colliders", Unit::None,
+        "Pairs of a body and a closed collider, or the ground, that are inside each other when the simulation starts.")
+        .warn_above(0.0, "Bodies start inside a collider or below the ground, and are pushed out the shortest way over 12 \
+            frames, which may be the wrong one. Move them apart at `start_frame`.");
+    NOT_PUSHED_OUT = Metric::new("not_pushed_out", Unit::None,
+        "Points that are still inside something after 12 frames, as they have been since the start; missing before, and \
+         without any at the start.")
+        .warn_above(0.0, "What started inside something could not be pushed out in 12 frames, and stays inside by \
+            `deepest_overlap`: pins or colliders leave it no room. Move bodies apart at `start_frame`.");
     LET_GO = Metric::new("let_go", Unit::None,
         "Edges of the surface that are stretched to more than 8 times their rest length, so that colliders let them \
          pass.")
@@ -256,6 +283,10 @@ metrics! { METRICS:
             {pins:idle_pins_wire}. Move them to the body at `start_frame`, or raise their `radius`.");
     IDLE_PINS_WIRE = Metric::new("idle_pins_wire", Unit::None, "The wire of the first of these pins, from 0; −1 if there is none.");
     IDLE_PINS_POINT = Metric::new("idle_pins_point", Unit::None, "The point of the first of these pins, from 0; −1 if there is none.");
+    CARRIED_OUTSIDE = Metric::new("carried_outside", Unit::None,
+        "Points of the mesh that rides along which are farther outside the tets than a tet is large.")
+        .warn_above(0.0, "The mesh that rides along reaches far out of the tets, which stretch it there beyond what the body \
+            does. Give `carry` of Tetrahedralize a mesh that lies within its surface, or the surface the shape of that mesh.");
     PINNED = Metric::new("pinned", Unit::None,
         "Particles held or pulled by pins. If it is 0, no particle was within a pin's `radius` at the start.");
     TORN = Metric::new("torn", Unit::None, "Coupling springs torn since the start.");
@@ -264,7 +295,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
-    6,
+    7,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
      other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
      pins hold them. `stiffness` has the same effect at any mesh resolution, and the solver is stable for any \

@@ -349,7 +349,7 @@ fn what_goes_wrong_with_a_soft_body_is_noted() {
         assert!(matches!(&found[..], [one] if one.starts_with(start) && one.contains(part)), "{changes:?} {found:#?}");
     };
     let inside = ["[0.2, 0, 0]", "[0.08, 0, 0]"];
-    only(&[inside], "`soft` (Softbody): `started_inside` is ", "Move them apart at `start_frame`.");
+    only(&[inside], "`soft` (Softbody): `started_in_colliders` is 1", "Move them apart at `start_frame`.");
     let press = ["[0.2, 0, 0]", r#"{"keyframes": [[1, [0, 0.11, 0]], [5, [0, -0.02, 0]]]}"#];
     let ground = [r#""gravity": [0, 0, 0]"#, r#""ground": true, "ground_height": -0.051"#];
     let found = notes(&soft_ball(&[press, ground]), &[]);

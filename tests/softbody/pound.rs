@@ -43,5 +43,7 @@ fn goals_on_the_interior_keep_the_dent_that_goals_on_all_particles_remove() {
     for name in ["inside", "everywhere", "free"] {
         let deepest = metrics[name]["deepest_overlap"].values().copied().fold(0.0, f64::max);
         assert!(deepest < 2e-3, "{name}: no collider is penetrated, {deepest}");
+        let inverted = metrics[name]["inverted_tets"].values().copied().fold(0.0, f64::max);
+        assert_eq!(inverted, 0.0, "{name}: no tet is turned inside out");
     }
 }

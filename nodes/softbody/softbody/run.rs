@@ -2,7 +2,9 @@
 
 use std::sync::{Arc, OnceLock};
 
-use bodies::collision::{CaughtParticle, CollisionScene, ContactParams, Ground, Obstacle, Overlap, Separation};
+use bodies::collision::{
+    CaughtParticle, CollisionScene, ContactParams, Ground, Obstacle, Overlap, OverlapPartner, Separation,
+};
 use bodies::mass_spring::{
     BodySolver, FrameReport, GoalSpring, Integrator, Pin, Plasticity, SoftBody, SolverFrame, State, flow, reset, tear,
 };
@@ -13,11 +15,13 @@ use super::goals::{GoalHistory, Goals};
 use super::measured::measured;
 use super::setup::{MaterialFields, ParticleNumber, SimulationSetup, StartInputs, refusal};
 use super::{
-    BODY_COLLISION, BOUNCE, COLLIDERS, COUPLING_BREAK, DEEPEST_OVERLAP, DEEPEST_PENETRATION, DRAG, FRICTION,
-    GOAL_DISTANCE, GOAL_ON, GOALS, GRAVITY, GROUND, GROUND_HEIGHT, IDLE_PINS, IDLE_PINS_POINT, IDLE_PINS_WIRE,
-    INITIAL_VELOCITY, INTEGRATOR, KEEP_DENTS, LET_GO, PINNED, PINS, PLASTIC_CREEP, PLASTIC_WORK, PLASTIC_YIELD,
-    POINTS_INSIDE, RESET_ENERGY, RESET_FRAMES, RESET_TO_GOALS, SELF_COLLISION, SEPARATION_FRAMES, START_FRAME,
-    STARTED_INSIDE, STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS, TIME_SCALE, TOLERANCE, VOLUME,
+    BODY_COLLISION, BOUNCE, CARRIED_OUTSIDE, COLLIDERS, COUPLING_BREAK, DEEPEST_OVERLAP, DEEPEST_PENETRATION, DRAG,
+    FRICTION, GOAL_DISTANCE, GOAL_ON, GOALS, GRAVITY, GROUND, GROUND_HEIGHT, IDLE_PINS, IDLE_PINS_POINT,
+    IDLE_PINS_WIRE, INITIAL_VELOCITY, INTEGRATOR, KEEP_DENTS, LET_GO, LOST_SHARE, NOT_PUSHED_OUT, PINNED, PINS,
+    PLASTIC_CREEP, PLASTIC_WORK, PLASTIC_YIELD, POINTS_INSIDE, RESET_ENERGY, RESET_FRAMES, RESET_TO_GOALS,
+    SELF_COLLISION, SEPARATION_FRAMES, START_FRAME, STARTED_IN_BODIES, STARTED_IN_BODIES_OTHER, STARTED_IN_BODIES_WIRE,
+    STARTED_IN_COLLIDERS, STARTED_INSIDE, STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS,
+    TIME_SCALE, TOLERANCE, VOLUME,
 };
 use super::{obstacles, pins};
 
@@ -27,7 +31,7 @@ pub(super) struct Run {
     inputs: StartInputs,
     state: State,
     goals: GoalHistory,
-    /// What overlapped at the start, and the number of frames since in which time passed.
+    /// What overlapped at the start, until it is out, and the number of frames since in which time passed.
     overlaps: Vec<Overlap>,
     frames_over: u32,
     caught: Vec<CaughtParticle>,
@@ -127,10 +131,12 @@ impl Run {
         scene.friction = friction.mask.as_deref();
         if is_start {
             let (overlaps, inside) = scene.overlaps(&self.state.positions);
-            self.overlaps = overlaps;
             self.metrics.set(STARTED_INSIDE, inside as f64);
+            set_overlaps(&setup, &overlaps, &mut self.metrics);
+            self.metrics.set(CARRIED_OUTSIDE, setup.carried_outside() as f64);
+            self.overlaps = overlaps;
         }
-        let overlaps = std::mem::take(&mut self.overlaps);
+        let mut overlaps = std::mem::take(&mut self.overlaps);
         let (over, seconds) = (self.frames_over, interval.seconds);
         let caught = std::mem::take(&mut self.caught);
         scene.caught = &caught;
@@ -140,9 +146,12 @@ impl Run {
         let before = self.state.positions.clone();
         let report = self.solve(cx, &mut solving, &influences, &scene, interval)?;
         self.caught = scene.caught_after(&before, &self.state.positions);
-        let started_inside = self.metrics.get(STARTED_INSIDE).unwrap_or(0.0);
+        let at_start = AT_START.map(|metric| (metric, self.metrics.get(metric).unwrap_or(0.0)));
         self.metrics = measured(&report, &self.state);
-        self.metrics.set(STARTED_INSIDE, started_inside);
+        at_start.into_iter().for_each(|(metric, value)| self.metrics.set(metric, value));
+        if cx.get(BOUNCE) != 0.0 {
+            self.metrics.set(LOST_SHARE, report.lost_share);
+        }
         self.metrics.set(PLASTIC_WORK, 0.0);
         self.metrics.set(RESET_ENERGY, 0.0);
         if !is_start {
@@ -151,11 +160,13 @@ impl Run {
         let far = influences.goals.distance(interval.frames[1], cx.get(GOAL_ON), &self.state.positions);
         self.metrics.set(GOAL_DISTANCE, far.unwrap_or(0.0));
         self.frames_over = over.saturating_add(u32::from(seconds > 0.0));
-        let apart = overlaps.is_empty() || self.frames_over >= SEPARATION_FRAMES;
-        self.measure_contacts(&setup, &scene, rub.thickness, apart);
+        let all_out = self.measure_contacts(&setup, &scene, rub.thickness);
         let support = solving.body.stiffness_to_weight(cx.get(GRAVITY).map(f64::from));
         if support.is_finite() && (scene.ground.is_some() || !obstacles.is_empty()) {
             self.metrics.set(STIFFNESS_TO_WEIGHT, support);
+        }
+        if all_out {
+            overlaps.clear();
         }
         self.metrics.set(PINNED, influences.pinned as f64);
         influences.goals.measure(interval.frames[1], cx.get(GOAL_ON), &self.state.positions, &mut self.metrics);
@@ -256,18 +267,25 @@ impl Run {
         }
     }
 
-    /// Sets the metrics of contacts from the positions that are returned. Until what overlapped at the start is `apart`,
-    /// surfaces went through nothing.
-    fn measure_contacts(&mut self, setup: &SimulationSetup, scene: &CollisionScene<'_>, thickness: f64, apart: bool) {
+    /// Sets the metrics of contacts from the positions that are returned. Until what overlapped at the start is out,
+    /// surfaces went through nothing; returns whether it is.
+    fn measure_contacts(&mut self, setup: &SimulationSetup, scene: &CollisionScene<'_>, thickness: f64) -> bool {
         let returned: Vec<[f64; 3]> =
             self.state.positions.iter().map(|position| position.map(|x| f64::from(x as f32))).collect();
         let found = scene.penetration(&returned, &setup.carried_at(&self.state.positions));
-        let through = if apart { (found.deepest - thickness).max(0.0) } else { 0.0 };
+        let started = scene.separation.is_some_and(|separation| !separation.overlaps.is_empty());
+        let is_over = self.frames_over >= SEPARATION_FRAMES;
+        if started && is_over {
+            self.metrics.set(NOT_PUSHED_OUT, found.inside as f64);
+        }
+        let all_out = !started || (is_over && found.inside == 0);
+        let through = if all_out { (found.deepest - thickness).max(0.0) } else { 0.0 };
         self.metrics.set(DEEPEST_OVERLAP, found.deepest);
         self.metrics.set(POINTS_INSIDE, found.inside as f64);
         self.metrics.set(DEEPEST_PENETRATION, through);
         let let_go = if scene.obstacles.is_empty() { 0 } else { setup.let_go(&self.state.positions) };
         self.metrics.set(LET_GO, let_go as f64);
+        all_out
     }
 
     #[expect(clippy::disallowed_methods, reason = "only moves what is there")]
@@ -278,6 +296,33 @@ impl Run {
         let setup = Arc::new(SimulationSetup::of(cx, &self.inputs)?);
         Ok(self.setup.get_or_init(|| setup).clone())
     }
+}
+
+/// Metrics of the start that later frames publish, too.
+const AT_START: [Metric; 6] = [
+    STARTED_INSIDE,
+    STARTED_IN_BODIES,
+    STARTED_IN_BODIES_WIRE,
+    STARTED_IN_BODIES_OTHER,
+    STARTED_IN_COLLIDERS,
+    CARRIED_OUTSIDE,
+];
+
+/// Sets the metrics of what is inside something at the start.
+fn set_overlaps(setup: &SimulationSetup, overlaps: &[Overlap], metrics: &mut MetricValues) {
+    let bodies = || {
+        overlaps.iter().filter_map(|overlap| match overlap.partner {
+            OverlapPartner::Skin(other) => Some([overlap.skin, other]),
+            OverlapPartner::Ground | OverlapPartner::Obstacle(_) => None,
+        })
+    };
+    let count = bodies().count();
+    let wires = bodies().next().map_or([None; 2], |pair| pair.map(|skin| setup.wire_of(skin)));
+    let [wire, other] = wires.map(|wire| wire.map_or(-1.0, |wire| wire as f64));
+    metrics.set(STARTED_IN_BODIES, count as f64);
+    metrics.set(STARTED_IN_BODIES_WIRE, wire);
+    metrics.set(STARTED_IN_BODIES_OTHER, other);
+    metrics.set(STARTED_IN_COLLIDERS, (overlaps.len() - count) as f64);
 }
 
 /// What may be in contact.

@@ -188,6 +188,18 @@ impl SimulationSetup {
         self.carried.iter().map(|points| points.iter().map(at).collect()).collect()
     }
 
+    /// The number of points of the surface that are farther outside the tets than a tet is large.
+    pub(super) fn carried_outside(&self) -> usize {
+        let is_outside = |carrier: &&EmbeddedPoint| carrier.weights.iter().any(|weight| *weight < -1.0);
+        self.carriers.iter().filter(is_outside).count()
+    }
+
+    /// The wire that the particles of a skin came through.
+    pub(super) fn wire_of(&self, skin: usize) -> Option<usize> {
+        let first = *self.skins[skin].particles().first()? as usize;
+        self.wires.iter().position(|wire| wire.contains(&first))
+    }
+
     /// The body that the solver works on.
     pub(super) fn body(&self, material: &MaterialFields) -> Result<SoftBody> {
         let mesh = Mesh {

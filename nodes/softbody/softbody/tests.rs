@@ -4,6 +4,9 @@ use engine::cook::{Engine, Settings};
 
 mod bounce;
 mod goals;
+mod inside;
+
+use inside::solid;
 
 const G: f64 = 9.81;
 /// Seconds of a frame.
@@ -215,6 +218,16 @@ fn a_fine_surface_is_carried_by_coarse_tets() {
 }
 
 #[test]
+fn a_carried_surface_far_outside_the_tets_is_counted() {
+    let outside = |points: Vec<[f32; 3]>| {
+        let mesh = Component::mesh(vec![3], vec![0, 1, 2], points).unwrap();
+        simulating(Geometry::from(cube()).with(mesh)).frames([1])[0].metrics["carried_outside"]
+    };
+    assert_eq!(outside(vec![[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.13, 0.0]]), 0.0, "within a tet's height of 0.05");
+    assert_eq!(outside(vec![[0.0; 3], [0.2, 0.0, 0.0], [0.0, 0.17, 0.0]]), 2.0);
+}
+
+#[test]
 fn a_goal_that_matches_no_body_or_two_is_refused() {
     let (goal, other) = (pressed(0, cube().into()), block([1; 3], [0.0; 3], [0.1; 3]));
     let refused = |bench: Bench| bench.input(GOALS, goal.clone()).at(2.0).try_cook().unwrap_err().fact;
@@ -262,85 +275,6 @@ fn plastic_work_is_published_where_springs_flow() {
 }
 
 /// A closed cube as a collider.
-fn solid(low: [f32; 3], size: f32) -> Component {
-    let cube = block([1; 3], low, [size; 3]);
-    let faces = bodies::tets::boundary(cube.tet_corners(), cube.positions());
-    let corners: Vec<u32> = faces.iter().flat_map(|face| face.corners).collect();
-    Component::mesh(vec![3; faces.len()], corners, cube.positions().to_vec()).unwrap()
-}
-
-#[test]
-fn particles_that_start_inside_something_are_counted_at_every_frame() {
-    let inside = |bench: Bench| {
-        let frames = bench.frames([1, 2, 3]);
-        assert_eq!(frames[1].metrics["started_inside"], frames[2].metrics["started_inside"]);
-        frames[2].metrics["started_inside"]
-    };
-    let at = |low: [f32; 3]| inside(simulating(cube()).input(COLLIDERS, solid(low, 0.2)));
-    assert_eq!(at([0.03, -0.05, -0.05]), 18.0, "all but the nine particles on the face at x = 0");
-    assert_eq!((at([0.1, 0.0, 0.0]), at([0.0995, 0.0, 0.0])), (0.0, 0.0), "closer than `thickness` is touching");
-    let mut open = solid([-0.05; 3], 0.2);
-    assert_eq!(inside(simulating(cube()).input(COLLIDERS, open.clone())), 27.0);
-    let Topology::Mesh(faces) = open.topology() else { panic!("a mesh has faces") };
-    open = Component::mesh(vec![3; 11], faces.corners[3..].to_vec(), open.positions().to_vec()).unwrap();
-    assert_eq!(inside(simulating(cube()).input(COLLIDERS, open)), 0.0, "an open collider has no inside");
-    assert_eq!(inside(simulating(cube()).set(GROUND, true).set(GROUND_HEIGHT, 0.05)), 9.0);
-    assert_eq!(inside(simulating(cube()).set(GROUND, true)), 0.0);
-    let two = |x: f32| simulating(cube()).input(BODIES, block([2; 3], [x, 0.01, 0.01], [0.1; 3]));
-    // Of each, the four corners that lie in the other one, and what is between them.
-    assert!((8.0..=20.0).contains(&inside(two(0.06))), "{}", inside(two(0.06)));
-    assert_eq!((inside(two(0.2)), inside(two(0.06).set(BODY_COLLISION, false))), (0.0, 0.0));
-}
-
-/// Two cubes of 0.1 m, the second 50 mm inside the first along x. They keep 1 mm, so each moves 51/24 mm a frame.
-#[test]
-fn bodies_that_start_inside_each_other_come_apart_evenly_in_twelve_frames() {
-    let second = || block([3, 2, 2], [0.05, 0.0, 0.0], [0.1; 3]);
-    let frames = simulating(cube()).input(BODIES, second()).set(GRAVITY, [0.0; 3]).frames(1..=24);
-    // All particles of the first but the middle one are points of its surface.
-    let first = cube().point_count() - 1;
-    let reach = |frame: &BenchResult, axis: usize, of: std::ops::Range<usize>| {
-        let points = &frame.mesh().positions()[of];
-        let along = points.iter().map(|p| f64::from(p[axis]));
-        along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], x| [low.min(x), high.max(x)])
-    };
-    assert!((frames[0].metrics["deepest_overlap"] - 0.051).abs() < 1e-6, "{:?}", frames[0].metrics);
-    // Inside are one of the first, in the middle of its face, and two of the second. All others lie on faces of the other
-    // body: the nine of the face at x = 0.1; and nine each at x = 0.05 and 0.083.
-    assert_eq!((frames[0].metrics["points_inside"], frames[0].metrics["started_inside"]), (3.0, 27.0));
-    for (over, frame) in frames.iter().enumerate() {
-        let all = frame.mesh().point_count();
-        let apart = reach(frame, 0, first..all)[0] - reach(frame, 0, 0..first)[1];
-        let even = -0.05 + 0.051 * (over as f64).min(12.0) / 12.0;
-        // Contacts give way by up to 1 mm, and nothing slows bodies that are pushed.
-        assert!(apart > even - 1e-3 && (over > 12 || apart < even + 2e-3), "{over}: {apart} {even}");
-        for axis in [1, 2] {
-            let [low, high] = reach(frame, axis, 0..all);
-            assert!(low.abs() < 1e-3 && (high - 0.1).abs() < 1e-3, "{over}: no shear, {low} {high}");
-        }
-        assert_eq!(frame.metrics["deepest_penetration"], 0.0, "{over}: {:?}", frame.metrics);
-    }
-    assert_eq!(frames[13].metrics["points_inside"], 0.0, "{:?}", frames[13].metrics);
-    assert!((frames[13].metrics["volume_ratio"] - 1.0).abs() < 0.01);
-}
-
-#[test]
-fn a_body_that_starts_in_a_collider_or_the_ground_is_pushed_out_evenly() {
-    let still = |bench: Bench| bench.set(GRAVITY, [0.0; 3]).set(STIFFNESS, 1e5.into()).frames(1..=16);
-    // Its lower 30 mm are in the box, or below the ground.
-    for bench in [
-        simulating(cube()).input(COLLIDERS, solid([-0.1, -0.27, -0.1], 0.3)),
-        simulating(cube()).set(GROUND, true).set(GROUND_HEIGHT, 0.03),
-    ] {
-        for (over, frame) in still(bench).iter().enumerate() {
-            let low = frame.mesh().positions().iter().map(|p| f64::from(p[1])).fold(f64::INFINITY, f64::min);
-            let even = 0.031 * (over as f64).min(12.0) / 12.0;
-            assert!(low > even - 1.2e-3 && (over > 12 || low < even + 1.2e-3), "{over}: {low} {even}");
-            assert!(over <= 12 || frame.metrics["deepest_overlap"] <= 1e-3, "{over}: {:?}", frame.metrics);
-        }
-    }
-}
-
 /// The collider is 0.4 mm beside the body, or 20 mm beside it with a point of the carried surface 5 mm inside.
 #[test]
 fn overlap_is_measured_on_the_points_that_are_returned() {

@@ -63,6 +63,31 @@ fn hit(modulus: f64, friction: f64) -> f64 {
     (along / (2.0 - friction * (2.0 + across)) - 1.0).abs()
 }
 
+/// An undamped cube of 0.1 m that is thrown straight at the ground: relative error of its speed of rebound, against 256
+/// steps a frame.
+fn rebound(modulus: f64, height: f64, speed: f64) -> f64 {
+    let speed_after = |substeps: u32| {
+        let block = shapes::block([2; 3], 0.05, [0.0, height, 0.0]);
+        let scene = Scene::of(block).set("initial_velocity", format!("[0, {}, 0]", -speed)).set("gravity", "[0, 0, 0]");
+        let scene = scene.set("stiffness", modulus).set("damping", 0).set("friction", 0).set("ground", true);
+        let cooked = scene.set("substeps", substeps).cook([12, 13], 2);
+        mean(&cooked.at(1))[1] - mean(&cooked.at(0))[1]
+    };
+    (speed_after(0) / speed_after(256) - 1.0).abs()
+}
+
+/// A stack of boxes of 0.1 m, each on the one below it, for a second: iterations of linear solves per Newton iteration,
+/// solves that reached their limit, and Newton iterations.
+fn stack(count: usize) -> (f64, usize, usize) {
+    let side = 0.1 + THICKNESS;
+    let boxed = |at: usize| shapes::block([4; 3], 0.025, [0.0, THICKNESS + side * at as f64, 0.0]);
+    let scene = (1..count).fold(Scene::of(boxed(0)), |scene, at| scene.and(boxed(at)));
+    let cooked = scene.set("stiffness", 1e5).set("ground", true).cook(1..=24, 2);
+    assert_eq!(cooked.errors, []);
+    let sum = |name: &str| cooked.metric(name).iter().sum::<f64>();
+    (sum("cg") / sum("newton"), sum("caps_hit") as usize, sum("newton") as usize)
+}
+
 /// A block of 0.6 by 0.6 m, `cells` cells of 0.1 m high, pressed to half its height between plates.
 fn pressed(cells: u32) -> Cooked {
     let height = 0.1 * f64::from(cells);
@@ -141,6 +166,10 @@ pub(super) fn figures() -> Vec<Figure> {
     let sticks = [0.7, 1.0, 1e6].map(|friction| on_slope(friction)[0]);
     let slides = [0.0, 0.3, 0.5].map(|friction| (on_slope(friction)[1] - 1.0).abs());
     let hits = [1e5, 1e6, 1e7, 1e8].map(|modulus| largest([0.1, 0.2, 0.3, 0.5].map(|friction| hit(modulus, friction))));
+    // As in the kernel's own test of bounces.
+    let throws = [(2e4, 0.21, 2.0), (2e5, 0.31, 10.0), (6e5, 0.31, 10.0), (2e6, 0.31, 10.0)];
+    let rebounds = throws.map(|(modulus, height, speed)| rebound(modulus, height, speed));
+    let [(alone, ..), (stacked, caps, solves)] = [1, 3].map(stack);
     let [cube, flat] = [6, 3].map(pressed);
     let volume = |pressed: &Cooked| (pressed.metric("volume_ratio").last().unwrap() - 1.0).abs();
     let turned = |pressed: &Cooked| *pressed.metric("inverted_tets").last().unwrap() as usize;
@@ -159,6 +188,19 @@ pub(super) fn figures() -> Vec<Figure> {
             "",
         )
         .missed(),
+        Figure::error(
+            "A cube thrown at the ground, E 2e4 to 2e6 Pa: error of the speed of its rebound, against 256 steps per frame",
+            largest(rebounds),
+            0.1,
+            "",
+        ),
+        Figure::error(
+            "Three boxes in a stack: linear iterations per Newton iteration ÷ those of one box",
+            stacked / alone,
+            4.0,
+            "",
+        ),
+        Figure::never("its solves that reached their limit of iterations", caps, solves),
         Figure::error(
             "Pressed to half its height between plates: volume error of a cube and of a block half as high",
             largest([volume(&cube), volume(&flat)]),

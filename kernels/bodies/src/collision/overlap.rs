@@ -113,6 +113,34 @@ impl<'a> Side<'a> {
         exits
     }
 
+    /// How far it has to go in a direction until no line through a point of its surface, as far as it is inside, is in
+    /// the other: what is beyond a thin part of the other has to pass it, too.
+    fn way_out(&self, other: &Self, direction: DVec3, gap: f64) -> f64 {
+        if !(self.surface.closed && other.surface.closed) {
+            return 0.0;
+        }
+        let vertices = &self.surface.vertices;
+        let mut own = vec![0.0; self.points.len()];
+        for exit in self.solid.exits(&self.below, vertices, direction) {
+            own[exit.point as usize] = exit.distance;
+        }
+        let mut way = 0.0_f64;
+        other.solid.stretches(&self.below, vertices, direction, |point, stretches| {
+            let point = point as usize;
+            let (mut left, own) = (0.0_f64, own[point] - BELOW * gap);
+            for [enters, leaves] in stretches {
+                if *enters < left + own && *leaves > left {
+                    left = *leaves;
+                }
+            }
+            if left > 0.0 {
+                let [below, point] = [&self.below, self.points].map(|all| DVec3::from(all[point]));
+                way = way.max(left + direction.dot(&(below - point)));
+            }
+        });
+        way
+    }
+
     /// Barycentric weights of the point of a triangle where a point of another side leaves it.
     fn weights(&self, other: &Self, exit: &Exit, direction: DVec3) -> [f64; 3] {
         let passed = DVec3::from(other.points[exit.point as usize]) + direction * exit.distance;
@@ -373,15 +401,20 @@ impl Ways {
             let axis = |k: i32| f64::from(k % 3 - 1);
             DVec3::new(axis(k), axis(k / 3), axis(k / 9))
         });
-        let depth = |direction: DVec3| {
-            let (out, past) = (side.exits(other, &own, direction), other.exits(side, &others, -direction));
-            out.iter().chain(&past).map(|exit| exit.distance).fold(0.0, f64::max)
-        };
         let directions = std::iter::once(shrinks).chain(lattice).filter_map(|direction| direction.try_normalize(0.0));
         let allowed = directions.filter(|direction| self.up.is_none_or(|up| direction.dot(&up) > -1e-9));
-        let ways = allowed.map(|direction| (depth(direction), direction));
-        let shortest = ways.reduce(|best, next| if next.0 < best.0 { next } else { best });
-        if let Some((depth, direction)) = shortest {
+        let (mut depth, mut shortest) = (f64::INFINITY, None);
+        for direction in allowed {
+            let (out, past) = (side.exits(other, &own, direction), other.exits(side, &others, -direction));
+            let points = out.iter().chain(&past).map(|exit| exit.distance).fold(0.0, f64::max);
+            if points < depth {
+                let lines = side.way_out(other, direction, self.gap).max(other.way_out(side, -direction, self.gap));
+                if points.max(lines) < depth {
+                    (depth, shortest) = (points.max(lines), Some(direction));
+                }
+            }
+        }
+        if let Some(direction) = shortest {
             found.push(Overlap { skin, partner, direction: direction.into(), depth: depth + self.gap });
         }
         inside

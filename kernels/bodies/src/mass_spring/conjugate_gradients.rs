@@ -7,6 +7,7 @@
 use super::body::SoftBody;
 use super::cholesky::Lower;
 use super::coarse::{ContactFilters, moved};
+use super::state::CachedCoarseFactor;
 use super::system::{System, solve_lower, solve_lower_transpose};
 use numerics::simd::Path;
 use numerics::vector::{DVec3, Vec3, to_f64};
@@ -46,12 +47,16 @@ pub(super) struct Scratch {
 /// The coarse level of the preconditioner; the fine one is `system.smoother`.
 #[derive(Clone, Copy)]
 pub(super) struct Coarse<'a> {
-    pub(super) factor: &'a Lower,
-    pub(super) offset_from_centroid: &'a [Vec3],
-    pub(super) filters: &'a ContactFilters,
+    factor: &'a Lower,
+    offset_from_centroid: &'a [Vec3],
+    filters: &'a ContactFilters,
 }
 
-impl Coarse<'_> {
+impl<'a> Coarse<'a> {
+    pub(super) fn new(cached: &'a CachedCoarseFactor, offset_from_centroid: &'a [Vec3]) -> Self {
+        Self { factor: &cached.factor, offset_from_centroid, filters: &cached.filters }
+    }
+
     /// Solves for the rigid motions `modes` of the clusters under `forces`; returns forcesᵀ·(PᵀAP)⁻¹·forces.
     fn solve(&self, forces: &[[f64; 6]], modes: &mut Vec<f64>) -> f64 {
         modes.clear();

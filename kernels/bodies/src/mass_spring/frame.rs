@@ -93,6 +93,9 @@ pub struct FrameReport {
     pub caps_hit: u32,
     /// Steps of [`Integrator::Accurate`] that were accepted with a larger estimated error than its tolerance allows.
     pub tolerance_missed: u32,
+    /// Steps with an impact that were not cut as short as its bounce needs, because the frame had taken too many Newton
+    /// iterations.
+    pub uncut_impacts: u32,
     /// Estimated error of positions that the frame added, metres: the sum over its steps of the largest error of a
     /// particle.
     pub error_estimate: f64,
@@ -109,6 +112,9 @@ pub struct FrameReport {
     /// Energy lost in other ways than by damping, drag and friction, joules: by time stepping, by contacts, and by limits
     /// on bounces and energy.
     pub energy_lost: f64,
+    /// That ÷ the energy there was, kinetic and stored; 0 if bodies moved less than half as fast as gravity moves them in a
+    /// frame.
+    pub lost_share: f64,
     /// Volume ÷ rest volume.
     pub volume_ratio: f64,
     /// The largest length ÷ rest length of a spring, or its reciprocal.
@@ -186,6 +192,7 @@ impl BodySolver {
         self.solver.lengths.clear();
         let mut energies = measure(&mut self.solver, &context, 0.0, &motion, false);
         self.solver.lengths.clone_from(&self.solver.lengths_now);
+        let before = energies;
         if seconds > 0.0 && !body.is_empty() {
             let mut stepper = Stepper {
                 solver: &mut self.solver,
@@ -201,6 +208,7 @@ impl BodySolver {
         }
         (report.inverted_tets, report.volume_ratio) = (self.solver.inventory.inverted, self.solver.inventory.ratio);
         describe(&mut report, &context, &energies, &motion);
+        report.lost_share = lost_share(report.energy_lost, [&before, &energies], body, gravity.norm() * seconds);
         state.acceleration.resize(body.len(), [0.0; 3]);
         state.loads.resize(body.len(), 0.0);
         for (caller, particle) in body.order.index_of.iter().enumerate() {
@@ -270,12 +278,16 @@ fn cut(
     let crushed = energies.scale() > CRUSHED * stepper.context.body.modulus_times_volume();
     let bounces = frame.integrator == Integrator::Default
         && frame.bounce.is_none_or(|bounce| bounce > 0.0 && bounce.is_finite())
-        && !(frame.force_implicit_euler || turned || crushed || stepped.jammed > 0)
-        && report.newton < MOST_NEWTON_OF_IMPACTS;
-    let parts = if bounces { (stepped.impact_error / IMPACT_ERROR).clamp(1.0, MOST_PARTS) } else { 1.0 };
-    let parts = (parts.ceil() as u32).next_power_of_two();
-    let is_over = (frame.cancelled)() || report.newton >= MOST_NEWTON || share <= 1.0 / f64::from(MOST_STEPS);
+        && !(frame.force_implicit_euler || turned || crushed || stepped.jammed > 0);
+    let wanted = if bounces { (stepped.impact_error / IMPACT_ERROR).clamp(1.0, MOST_PARTS) } else { 1.0 };
+    let wanted = (wanted.ceil() as u32).next_power_of_two();
+    // As many as the frame can still pay for, if a part costs what the whole did.
+    let left = MOST_NEWTON_OF_IMPACTS.saturating_sub(report.newton) / stepped.solved.newton.max(1);
+    let parts = wanted.min(1 << left.max(1).ilog2());
+    let shortest = share <= 1.0 / f64::from(MOST_STEPS);
+    let is_over = (frame.cancelled)() || report.newton >= MOST_NEWTON || shortest;
     if is_over || !(unmet && !no_help || parts > 1) {
+        report.uncut_impacts += u32::from(wanted > 1 && !shortest);
         return accept(stepper, report, energies, &stepped);
     }
     add_work(report, &stepped);
@@ -355,6 +367,16 @@ fn accept(stepper: &mut Stepper<'_>, report: &mut FrameReport, energies: &mut En
     report.stopped = report.stopped.max(stepped.stopped);
     (report.contacts, report.deepest_overlap) = (stepped.contacts, report.deepest_overlap.max(stepped.overlap));
     report.jammed = report.jammed.max(stepped.jammed);
+}
+
+/// Energy `lost` in a frame in which gravity adds the speed `falling`, relative to what there was; 0 for slow bodies.
+fn lost_share(lost: f64, [before, after]: [&Energies; 2], body: &SoftBody, falling: f64) -> f64 {
+    /// Fraction of `falling` that is slow, and of the energy of a crushed body that is little.
+    const SLOW: f64 = 0.5;
+    const LITTLE: f64 = 1e-6;
+    let slow = 0.5 * body.mass.iter().sum::<f64>() * (SLOW * falling) * (SLOW * falling);
+    let share = lost / before.scale().max(after.scale() + lost);
+    if before.kinetic > slow + LITTLE * body.modulus_times_volume() && share.is_finite() { share } else { 0.0 }
 }
 
 fn describe(report: &mut FrameReport, context: &FrameContext<'_>, energies: &Energies, motion: &Kinematics) {

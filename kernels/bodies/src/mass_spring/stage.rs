@@ -272,11 +272,7 @@ impl StageSolver {
 
     /// Applies the preconditioner to `r`, an approximation of A⁻¹r.
     pub(super) fn smooth(&self, body: &SoftBody, cached: &CachedCoarseFactor, r: &mut [DVec3]) {
-        let coarse = Coarse {
-            factor: &cached.factor,
-            offset_from_centroid: &self.offset_from_centroid,
-            filters: &cached.filters,
-        };
+        let coarse = Coarse::new(cached, &self.offset_from_centroid);
         conjugate_gradients::precondition(&self.system, body, coarse, r);
     }
 
@@ -287,11 +283,7 @@ impl StageSolver {
         cached: &CachedCoarseFactor,
         r: &mut Vec<DVec3>,
     ) -> conjugate_gradients::Reached {
-        let coarse = Coarse {
-            factor: &cached.factor,
-            offset_from_centroid: &self.offset_from_centroid,
-            filters: &cached.filters,
-        };
+        let coarse = Coarse::new(cached, &self.offset_from_centroid);
         let limits = Limits { share: CG_SHARE, square: f64::INFINITY, cap: CG_CAP };
         let mut out = vec![DVec3::zeros(); r.len()];
         let reached =
@@ -380,11 +372,7 @@ impl StageSolver {
         cached: &CachedCoarseFactor,
         limits: Limits,
     ) -> conjugate_gradients::Reached {
-        let coarse = Coarse {
-            factor: &cached.factor,
-            offset_from_centroid: &self.offset_from_centroid,
-            filters: &cached.filters,
-        };
+        let coarse = Coarse::new(cached, &self.offset_from_centroid);
         conjugate_gradients::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut self.dx, &mut self.r)
     }
 

@@ -2,9 +2,9 @@
 //!
 //! A region has the energy ½κ(V − V₀)²/V₀ plus a fourth-order term: κ acts against the bulk modulus of the springs,
 //! and large changes of volume are resisted much more, at little cost where there are none. A tetrahedron below
-//! [`THIN`] of its volume has ½μ(THIN·V₀ − V)²/V₀, which acts through the flat state and beyond, where springs pull
-//! either way. Both are linearised by their gradient alone (Gauss–Newton), which keeps the system positive
-//! semi-definite.
+//! [`THIN`] of its volume has ½μ(THIN·V₀ − V)²/V₀ and a term of fourth order too, which acts through the flat state and
+//! beyond, where springs pull either way. Both are linearised by their gradient alone (Gauss–Newton), which keeps the
+//! system positive semi-definite.
 
 use super::body::{SoftBody, volume};
 use super::partition::{Partition, RaggedSlice};
@@ -20,6 +20,9 @@ const STIFFENING: f64 = 0.0065;
 const STIFFENING_END: f64 = 0.04;
 /// Volume ÷ rest volume below which the barrier acts on a tetrahedron.
 const THIN: f64 = 0.3;
+/// Volume lost beyond that, relative to the rest volume, at which the barrier has doubled. At no volume it is ten times as
+/// strong as at first: goals and hands press harder than E. With 13 times, smashed dough gains energy.
+const THIN_STIFFENING: f64 = THIN / 3.0;
 /// Volume ÷ rest volume below which a tetrahedron is watched during a step. One that becomes thin within a step has
 /// to be watched too, or the next step would start with spurious energy.
 const WATCHED: f64 = 0.7;
@@ -140,7 +143,8 @@ impl Volumes {
             for (((region, pressure), slope), mine) in regions_here {
                 let volume = regions.measure(region, x, mine);
                 let k = stiffness[region];
-                let (push, steep, energy) = stiffened(volume - rest[region], rest[region]);
+                let (push, steep, energy) =
+                    stiffened(volume - rest[region], rest[region], [STIFFENING, STIFFENING_END]);
                 let (dashed, more) = (k * regions.damping[region] / a, volume - before[region]);
                 *pressure = k * push + dashed * more;
                 *slope = k * steep + dashed;
@@ -173,32 +177,47 @@ impl Volumes {
             let at = corners.map(|corner| x[corner as usize]);
             let left = THIN * rest[tet] - volume(at);
             let stiffness = OPENING * self.share * body.moduli[tet] / rest[tet].max(f64::MIN_POSITIVE);
-            let pressure = stiffness * left;
-            let thin = ThinTet { corners, gradient: opening(at), stiffness, pressure, energy: 0.5 * pressure * left };
+            let (push, slope, energy) = barrier(left, rest[tet]);
+            let thin = ThinTet {
+                corners,
+                gradient: opening(at),
+                stiffness: stiffness * slope,
+                pressure: stiffness * push,
+                energy: stiffness * energy,
+            };
             (left > 0.0 && thin.energy.is_finite()).then_some(thin)
         };
         watched.iter().filter_map(of).collect()
     }
 }
 
-/// Resistance to a change of volume, relative to κ/V₀: linear near rest, increasing from [`STIFFENING`] on, linear again
-/// from [`STIFFENING_END`] on. Returns the value, its derivative and its integral.
-fn stiffened(lost: f64, rest: f64) -> (f64, f64, f64) {
-    let soft = 1.0 / (STIFFENING * rest * STIFFENING * rest);
-    let curved = |lost: f64| {
-        let square = lost * lost * soft;
-        (lost * (1.0 + square), 1.0 + 3.0 * square, lost * lost * (0.5 + 0.25 * square))
+/// Resistance to a `change` of volume, relative to that to small ones: linear at first, twice as much at the change
+/// `doubled` ÷ `rest`, linear again from `end` on. Returns the value, its derivative and its integral.
+fn stiffened(change: f64, rest: f64, [doubled, end]: [f64; 2]) -> (f64, f64, f64) {
+    let soft = 1.0 / (doubled * rest * doubled * rest);
+    let curved = |change: f64| {
+        let square = change * change * soft;
+        (change * (1.0 + square), 1.0 + 3.0 * square, change * change * (0.5 + 0.25 * square))
     };
-    let edge = STIFFENING_END * rest;
+    let end = end * rest;
     if rest <= 0.0 {
         return (0.0, 0.0, 0.0);
     }
-    if lost.abs() <= edge {
-        return curved(lost);
+    if change.abs() <= end {
+        return curved(change);
     }
-    let (push, slope, energy) = curved(edge);
-    let more = lost.abs() - edge;
-    ((push + slope * more).copysign(lost), slope, energy + push * more + 0.5 * slope * more * more)
+    let (push, slope, energy) = curved(end);
+    let more = change.abs() - end;
+    ((push + slope * more).copysign(change), slope, energy + push * more + 0.5 * slope * more * more)
+}
+
+/// The barrier of a tetrahedron that has `left` to gain until it is no longer thin, likewise. Once inverted it is resisted
+/// as at first, so that one that is far inside out stores little energy.
+fn barrier(left: f64, rest: f64) -> (f64, f64, f64) {
+    let inverted = (left - THIN * rest).max(0.0);
+    let (push, slope, energy) = stiffened(left - inverted, rest, [THIN_STIFFENING, THIN]);
+    let slope = if inverted > 0.0 { 1.0 } else { slope };
+    (push + inverted, slope, energy + push * inverted + 0.5 * inverted * inverted)
 }
 
 /// Gradient of a tetrahedron's volume with respect to each corner.

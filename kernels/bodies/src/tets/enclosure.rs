@@ -65,37 +65,86 @@ impl Enclosure {
     /// Where those of `candidates` (indices into `points`) that lie inside leave the surface along a unit `direction`,
     /// in their order.
     pub(crate) fn exits(&self, points: &[[f64; 3]], candidates: &[u32], direction: DVec3) -> Vec<Exit> {
-        let near = self.near(points, candidates);
-        let Some(origin) = self.corners.first().map(|corner| to_f64(*corner)).filter(|_| !near.is_empty()) else {
-            return Vec::new();
+        let mut exits = Vec::new();
+        self.crossings(points, &self.near(points, candidates), direction, |point, crossed| {
+            let mut left: i32 = crossed.iter().map(|crossing| crossing.passed).sum();
+            if left <= 0 {
+                return;
+            }
+            let last = crossed.iter().find(|crossing| {
+                left -= crossing.passed;
+                left <= 0
+            });
+            exits.extend(last.map(|last| Exit { point, face: last.face, distance: last.height.max(0.0) }));
+        });
+        exits
+    }
+
+    /// Calls `act` with each of `candidates` and the stretches of its line along a unit `direction` that are inside:
+    /// distances at which they begin, 0 if the point is inside, and end.
+    pub(crate) fn stretches(
+        &self,
+        points: &[[f64; 3]],
+        candidates: &[u32],
+        direction: DVec3,
+        mut act: impl FnMut(u32, &[[f64; 2]]),
+    ) {
+        let mut stretches = Vec::new();
+        self.crossings(points, candidates, direction, |point, crossed| {
+            stretches.clear();
+            let mut left: i32 = crossed.iter().map(|crossing| crossing.passed).sum();
+            let mut begin = 0.0;
+            for crossing in crossed {
+                let before = left;
+                left -= crossing.passed;
+                match (before > 0, left > 0) {
+                    (false, true) => begin = crossing.height,
+                    (true, false) => stretches.push([begin, crossing.height]),
+                    _ => {}
+                }
+            }
+            act(point, &stretches);
+        });
+    }
+
+    /// Calls `act` with each of `candidates` and where its line along a unit `direction` crosses the surface, in order.
+    fn crossings(
+        &self,
+        points: &[[f64; 3]],
+        candidates: &[u32],
+        direction: DVec3,
+        mut act: impl FnMut(u32, &[Crossing]),
+    ) {
+        let Some(origin) = self.corners.first().map(|corner| to_f64(*corner)).filter(|_| !candidates.is_empty()) else {
+            return;
         };
         let side = direction.cross(&if direction.x.abs() < 0.7 { DVec3::x() } else { DVec3::y() }).normalize();
         let turn = DMat3::from_rows(&[side.transpose(), direction.cross(&side).transpose(), direction.transpose()]);
         // Turned so that the direction is +z, that of the rays that winding numbers are counted on.
         let turned: Vec<[f32; 3]> = self.corners.iter().map(|p| to_f32(turn * (to_f64(*p) - origin))).collect();
-        let Some((grid, grid_points)) = snapped(&turned) else { return Vec::new() };
+        let Some((grid, grid_points)) = snapped(&turned) else { return };
         let shells = vec![0; self.triangles.len()];
         let winding = Winding::new(&grid_points, &self.triangles, &shells);
-        let mut crossed: Vec<(f64, u32, i32)> = Vec::new();
-        let exit = |point: u32| {
-            let at = turn * (DVec3::from(points[point as usize]) - origin);
+        let mut crossed: Vec<Crossing> = Vec::new();
+        let [low, high] = bounds(turned.iter().map(|p| p.map(f64::from)));
+        for point in candidates {
+            let at = turn * (DVec3::from(points[*point as usize]) - origin);
             crossed.clear();
-            winding.crossed(grid.grid_point(at.into()).map(i64::from), 1, |face, passed| {
-                let corners = self.triangles[face as usize].map(|corner| to_f64(turned[corner as usize]));
-                crossed.push((height_above(at, corners), face, passed));
-            });
-            crossed.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            let mut left: i32 = crossed.iter().map(|(_, _, passed)| passed).sum();
-            if left <= 0 {
-                return None;
+            if !(0..2).all(|axis| low[axis] <= at[axis] && at[axis] <= high[axis]) || at.z > high[2] {
+                continue;
             }
-            let last = crossed.iter().find(|(_, _, passed)| {
-                left -= passed;
-                left <= 0
+            let mut from = grid.grid_point(at.into()).map(i64::from);
+            if at.z < low[2] {
+                // The grid does not reach below the surface.
+                from[2] = -1;
+            }
+            winding.crossed(from, 1, |face, passed| {
+                let corners = self.triangles[face as usize].map(|corner| to_f64(turned[corner as usize]));
+                crossed.push(Crossing { height: height_above(at, corners), face, passed });
             });
-            last.map(|(height, face, _)| Exit { point, face: *face, distance: height.max(0.0) })
-        };
-        near.into_iter().filter_map(exit).collect()
+            crossed.sort_by(|a, b| a.height.total_cmp(&b.height).then(a.face.cmp(&b.face)));
+            act(*point, &crossed);
+        }
     }
 
     /// Those of `candidates` that are within the bounding box.
@@ -120,6 +169,13 @@ fn height_above(at: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     let height = normal.dot(&(a - at)) / normal.z;
     let (low, high) = (a.z.min(b.z).min(c.z) - at.z, a.z.max(b.z).max(c.z) - at.z);
     if height.is_finite() { height.clamp(low, high) } else { low }
+}
+
+/// Where the line of a point crosses a triangle: 1 from behind, −1 from the front.
+struct Crossing {
+    height: f64,
+    face: u32,
+    passed: i32,
 }
 
 /// Where a point leaves a surface.
@@ -191,6 +247,22 @@ mod tests {
         let away = exits(&shell, &all, [0.5, 0.5, 0.1], DVec3::z());
         assert!((away[0].distance - 0.15).abs() < 1e-6, "into the cavity: {away:?}");
         assert_eq!(exits(&shell, &all, [0.5; 3], DVec3::z()), [], "the cavity is outside");
+        // Lines of points outside, inside, in the cavity, beyond, and beside.
+        let solid = Enclosure::new(&all, &shell, 0.0);
+        for (at, expected) in [
+            ([0.5, 0.5, -0.5], &[[0.5, 0.75], [1.25, 1.5]][..]),
+            ([0.5, 0.5, 0.0625], &[[0.0, 0.1875], [0.6875, 0.9375]]),
+            ([0.5; 3], &[[0.25, 0.5]]),
+            ([0.5, 0.5, 1.5], &[]),
+            ([0.125, 0.5, -0.5], &[[0.5, 1.5]]),
+        ] {
+            let mut found = Vec::new();
+            solid.stretches(&[at], &[0], DVec3::z(), |_, stretches| found.extend_from_slice(stretches));
+            assert_eq!(found, expected, "{at:?}");
+        }
+        let mut beside = 0;
+        solid.stretches(&[[-0.5, 0.5, 0.5]], &[0], DVec3::z(), |_, _| beside += 1);
+        assert_eq!(beside, 0, "its line misses the surface");
     }
 
     #[test]

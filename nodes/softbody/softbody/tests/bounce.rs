@@ -37,6 +37,33 @@ fn a_dropped_cube_comes_back_to_the_height_that_bounce_gives() {
     assert!((0.19..0.8).contains(&material), "{material}");
 }
 
+/// The largest share of their energy that cubes lose in a frame, and impacts that were not followed.
+fn lost(bench: Bench) -> (Option<f64>, f64) {
+    let frames =
+        bench.set(GROUND, true).set(STIFFNESS, 1e6.into()).set(INITIAL_VELOCITY, [0.0, -5.0, 0.0]).frames(1..=6);
+    let most = |name: &str| frames.iter().filter_map(|frame| frame.metrics.get(name).copied()).reduce(f64::max);
+    (most("lost_share"), most("uncut_impacts").unwrap())
+}
+
+#[test]
+fn a_body_that_stops_dead_where_it_would_bounce_is_told_from_one_that_bounces() {
+    let thrown = || simulating(block([2; 3], [0.0, 0.3, 0.0], [0.1; 3]));
+    let (followed, uncut) = lost(thrown());
+    assert!((0.1..0.9).contains(&followed.unwrap()) && uncut == 0.0, "{followed:?} {uncut}");
+    for stopped in [thrown().set(SUBSTEPS, 1), thrown().set(INTEGRATOR, Stepping::Euler)] {
+        assert!(lost(stopped).0.unwrap() > 0.95);
+    }
+    assert_eq!(lost(thrown().set(BOUNCE, 0.0)), (None, 0.0), "it is meant to");
+}
+
+/// Each of its steps takes so many Newton iterations that a frame cannot pay for its impacts.
+#[test]
+fn impacts_for_which_a_frame_has_no_iterations_left_are_counted() {
+    let boxes = (0..25).map(|at| block([2; 3], [0.0, 0.001 + 0.101 * at as f32, 0.0], [0.1; 3]));
+    let tower = boxes.fold(bench(&NODE), |bench, boxed| bench.input(BODIES, boxed));
+    assert!(lost(tower).1 > 0.0);
+}
+
 #[test]
 fn what_an_undamped_cube_loses_is_published() {
     let cube = block([2; 3], [0.0, 0.21, 0.0], [0.1; 3]);

@@ -46,6 +46,24 @@ fn a_body_leaves_an_obstacle_the_shortest_way() {
     assert!(after.iter().all(|contact| contact.friction > 0.0), "contacts are ordinary again");
 }
 
+/// A cube of 0.1 m with a plate of 10 mm through its middle, which only its middle layer of particles is inside: what is
+/// below the plate has to pass it, too.
+#[test]
+fn a_body_leaves_a_thin_obstacle_as_a_whole() {
+    let body = block([4; 3], 0.025, [0.0, -0.05, 0.0]);
+    let (points, triangles) = cuboid([1.0, 0.01, 1.0]);
+    let skins = [skin(&body)];
+    for sunk in [0.0, 0.003] {
+        let points: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1] - sunk, p[2]]).collect();
+        let obstacles = [Obstacle::new(&triangles, &[pose(0.0, &points)], 1.0, THICKNESS, 0.5).unwrap()];
+        let scene = CollisionScene { skins: &skins, obstacles: &obstacles, ..CollisionScene::default() };
+        let (found, _) = scene.overlaps(&body.0);
+        let [Overlap { direction, depth, .. }] = found[..] else { panic!("{found:?}") };
+        assert!((depth - (0.056 - sunk)).abs() < 1e-7 && (direction[1].abs() - 1.0).abs() < 1e-12, "{found:?}");
+        assert!(sunk == 0.0 || direction[1] > 0.0, "{found:?}");
+    }
+}
+
 #[test]
 fn overlaps_are_found_with_the_ground_and_other_bodies_only_where_they_are() {
     let bodies = [block([2; 3], 0.05, [0.0; 3]), block([3, 2, 2], 0.05, [0.07, 0.01, 0.01])];
