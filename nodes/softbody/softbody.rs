@@ -198,7 +198,7 @@ metrics! { METRICS:
             are meant to.");
     UNCUT_IMPACTS = Metric::new("uncut_impacts", Unit::None,
         "Time steps in which a body hits something that should have been cut shorter for its bounce, but were not because \
-         the frame took 300 Newton iterations or more.")
+         the frame took 350 Newton iterations or more.")
         .warn_above(0.0, "So much is in contact that there is no time for bounces at these frames: bodies lose more speed \
             than their material would. Set `substeps` to pay for them, or `bounce` to 0 if they need not bounce.");
     VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume relative to the rest volume.")

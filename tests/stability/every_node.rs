@@ -272,7 +272,8 @@ pub(crate) fn cook_for(mut graph: Graph, node: &Node, change: Change, threads: u
 /// The outcome and its figure, or what is wrong.
 pub(crate) fn judged(cooked: &Cooked) -> Result<(Outcome, String), String> {
     for (kind, said) in &cooked.errors {
-        if !matches!(kind, ErrorKind::Refused | ErrorKind::NotFinite) {
+        // A file with such values is refused as it is read.
+        if !matches!(kind, ErrorKind::Refused | ErrorKind::NotFinite | ErrorKind::File) {
             return Err(said.clone());
         }
     }

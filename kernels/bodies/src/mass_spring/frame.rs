@@ -266,7 +266,7 @@ fn cut(
     /// Energy ÷ (E × volume) above which a body is crushed.
     const CRUSHED: f64 = 10.0;
     /// Newton iterations of a frame after which steps are no longer cut for that.
-    const MOST_NEWTON_OF_IMPACTS: u32 = 300;
+    const MOST_NEWTON_OF_IMPACTS: u32 = 350;
     let start = stepper.start(motion);
     let turned = stepper.solver.inventory.inverted > 0;
     let stepped = stepper.step(motion, times, energies, None);
@@ -313,10 +313,15 @@ fn adapt(
     const RESERVE: f64 = 0.9;
     /// Newton iterations of a frame after which steps are accepted and counted, so that the frame ends.
     const MOST_NEWTON: u32 = 4000;
+    /// The share of what is left of the frame that each step from then on takes at least.
+    const LAST: f64 = 0.125;
     let (mut time, mut share) = (0.0, 1.0_f64);
     while time < 1.0 && !(stepper.frame.cancelled)() {
         // Equal steps to the end, which avoids a tiny last one.
         let left = 1.0 - time;
+        if report.newton >= MOST_NEWTON {
+            share = share.max(LAST * left);
+        }
         let count = (left / share).ceil().clamp(1.0, f64::from(MOST_STEPS));
         let end = if count <= 1.0 { 1.0 } else { time + left / count };
         let before = stepper.start(motion);

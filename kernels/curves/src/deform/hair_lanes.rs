@@ -241,7 +241,7 @@ impl<'a> HairLanes<'a> {
                 continue;
             }
             let [w, axis @ ..] = turns.get(lane);
-            let sine = (axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]).sqrt();
+            let sine = DVec3::from(axis).norm();
             let mut some = [1.0, 0.0, 0.0, 0.0];
             if sine > 0.0 {
                 let (part_sine, part_cosine) = libm::sincos(share * libm::atan2(sine, w));
@@ -344,7 +344,7 @@ impl Share {
         for lane in 0..LANES {
             let (x, y, z, w, weight) = (x.0[lane], y.0[lane], z.0[lane], w.0[lane], self.weight.0[lane]);
             // Divided by its squared length, which rounding to f32 made unequal to 1.
-            let twice = 2.0 / (x * x + y * y + z * z + w * w);
+            let twice = 2.0 / (DVec3::new(x, y, z).norm_squared() + w * w);
             self.matrix[0].0[lane] = (1.0 - twice * (y * y + z * z)) * weight;
             self.matrix[1].0[lane] = twice * (x * y - w * z) * weight;
             self.matrix[2].0[lane] = twice * (x * z + w * y) * weight;
@@ -388,7 +388,7 @@ fn difference(a: &[F64x16; 3], b: &[F64x16; 3]) -> [F64x16; 3] {
 fn lengths([x, y, z]: &[F64x16; 3]) -> F64x16 {
     let mut out = F64x16::ZERO;
     for lane in 0..LANES {
-        out.0[lane] = (x.0[lane] * x.0[lane] + y.0[lane] * y.0[lane] + z.0[lane] * z.0[lane]).sqrt();
+        out.0[lane] = DVec3::new(x.0[lane], y.0[lane], z.0[lane]).norm();
     }
     out
 }

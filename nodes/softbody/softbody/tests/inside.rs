@@ -1,6 +1,7 @@
 //! What starts inside something: counted, said, and pushed out.
 
 use super::*;
+use numerics::vector::length;
 
 pub(super) fn solid(low: [f32; 3], size: f32) -> Component {
     let cube = block([1; 3], low, [size; 3]);
@@ -86,7 +87,7 @@ fn ball(count: usize, radius: f32, at: [f32; 3]) -> Component {
     let mut ball = block([count; 3], [-1.0; 3], [2.0; 3]);
     let round = |p: &[f32; 3]| {
         let most = p.iter().fold(0.0_f32, |most, x| most.max(x.abs()));
-        let length = p.iter().map(|x| x * x).sum::<f32>().sqrt();
+        let length = length(*p);
         let scale = if length > 0.0 { radius * most / length } else { 0.0 };
         std::array::from_fn(|k| at[k] + scale * p[k])
     };

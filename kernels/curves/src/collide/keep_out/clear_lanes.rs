@@ -125,9 +125,8 @@ impl ClearLanes {
     fn tested_starts(&self, from: &[F64x16; 3], to: &[F64x16; 3]) -> [F64x16; 3] {
         let mut start = *to;
         for lane in 0..LANES {
-            let along =
-                [to[0].0[lane] - from[0].0[lane], to[1].0[lane] - from[1].0[lane], to[2].0[lane] - from[2].0[lane]];
-            let length = (along[0] * along[0] + along[1] * along[1] + along[2] * along[2]).sqrt();
+            let along = DVec3::from_fn(|axis, _| to[axis].0[lane] - from[axis].0[lane]);
+            let length = along.norm();
             let share = self.untested.0[lane] / length;
             for axis in 0..3 {
                 let at = from[axis].0[lane] + along[axis] * share;
