@@ -111,8 +111,9 @@ fn print_unfreed(curves: usize) {
 fn print_heights(curves: usize) {
     println!("body    offset_scale  pressed CVs  at most 2 % low  5 % low  within 5 %  length error");
     for body in ["plane", "camel", "folds", "knot", "sphere"] {
+        let groom = Groom::on(Body::named(body), curves);
         for share in [1.0, 0.5] {
-            let heights = Heights::on(body, curves, share);
+            let heights = Heights::on(&groom, share, 12);
             let [two, five, within] = heights.percents();
             println!(
                 "{body:7} {share:12} {:12} {two:14.2} % {five:6.2} % {within:9.2} % {:13.1e}",
