@@ -39,8 +39,8 @@ const OUT: Output = Output::like("geometry", &GEOMETRY, "The geometry with the a
 
 metrics! { METRICS:
     UNREACHED = Metric::new("unreached", Unit::None, "Rows without anything of `source` within `radius`.")
-        .warn_above(0.0, "Nothing of `source` is within `radius` of these rows, which keep the values that they have, or neutral \
-            ones. Raise `radius`, or set it to 0 to take the nearest value however far it is.");
+        .warn_above(0.0, "Nothing of `source` is within `radius` of these rows. They keep the values that they had; where the \
+            attribute is new, they get its neutral value. Raise `radius`, or set it to 0 to take the nearest value at any distance.");
 }
 
 pub(crate) static NODE: Node = Node::new(

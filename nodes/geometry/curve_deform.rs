@@ -24,7 +24,7 @@ use std::sync::Arc;
 
 use crate::shared::faces::{counted, inside_out, same_faces};
 use crate::shared::kept::Array;
-use crate::shared::skin::Skin;
+use crate::shared::skin::skin;
 
 inputs! { INPUTS:
     CURVES: Input = Input::one("curves", Kind::Curves, "The groom at rest, root first.");
@@ -68,10 +68,10 @@ metrics! { METRICS:
         .warn_above(0.0, "These curves follow no guide: they only move with the skin, if one is wired. Raise `radius`, set it to 0 \
             to let every curve follow its nearest guides, or grow guides near them.");
     OFF_SKIN = Metric::new("guides_off_skin", Unit::None,
-        "Guides whose roots do not move with the skin: they are farther from where it carries them than half of its way \
-         there, and than a hundredth of their lengths.")
-        .warn_above(0.0, "`skin` moves, but not the roots of these guides, so that the roots of curves leave the skin as theirs \
-            do. Carry the guides along first: put Curve_Attach, with the same `rest_skin` and `skin`, before what bends them.");
+        "Guides whose roots do not move with the skin. One counts if its root misses the place to which the skin carries it \
+         by more than half of that displacement, and by more than a hundredth of the guide's length.")
+        .warn_above(0.0, "`skin` moves, but the roots of these guides stay behind, and take the roots of curves off the skin with \
+            them. Carry the guides along first: put Curve_Attach, with the same `rest_skin` and `skin`, before what bends them.");
     FAR_ROOTS = Metric::new("far_roots", Unit::None,
         "Curves and guides whose roots are farther from the skin at rest than they are long.")
         .warn_above(0.0, "These curves are farther from `rest_skin` than they are long, so they probably grew on another \
@@ -134,8 +134,8 @@ fn cook(cx: &Cx) -> Result<Outputs> {
             off_skin = roots_off(rest_guides, guides, poses);
         }
         let mut points = deformed.points;
-        if let Some((_, skin)) = skins.filter(|_| cx.get(KEEP_OUT)) {
-            let skin = Skin::of(skin);
+        if let Some((_, mesh)) = skins.filter(|_| cx.get(KEEP_OUT)) {
+            let skin = skin(mesh);
             let how = KeepOut {
                 skin: skin.surface(),
                 rest: curves.positions(),

@@ -30,8 +30,8 @@ metrics! { METRICS:
     TOTAL = Metric::new("cvs", Unit::None, "Number of CVs.");
     NOTHING_LEFT = Metric::new("nothing_left", Unit::None, "Curves of which one CV is left.");
     CROSSED = Metric::new("crossed", Unit::None, "Curves whose `from` is above their `to`, so that nothing is left of them.")
-        .warn_above(0.0, "Of curves whose `from` is above `to` one CV is left, so that nothing is drawn of them. Exchange the \
-            two numbers; with a mask, see that it keeps `from` below `to`.");
+        .warn_above(0.0, "These curves are left with a single CV and are not drawn, because their `from` is above their `to`. Swap \
+            the two numbers; if one of them is masked, check the values of its mask.");
 }
 
 pub(crate) static NODE: Node = Node::new(

@@ -22,12 +22,12 @@
 
 use std::sync::Arc;
 
-use curves::collide::{Collide, ContactMethod, at_rest, collide};
+use curves::collide::{Collide, ContactMethod, SkinMesh, at_rest, collide};
 use engine::prelude::*;
 use numerics::tree::TriangleTree;
 
 use crate::shared::group::{self, Group, taken};
-use crate::shared::surface::{Surface, tree};
+use crate::shared::surface::{skin, tree};
 
 choice! {
     /// How a segment's turn is stopped.
@@ -241,13 +241,13 @@ fn collided(cx: &Cx, curves: &Component, rest: &Component) -> Result<Found> {
     let colliders = cx.part(COLLIDERS);
     let trees: Vec<Arc<TriangleTree>> = colliders.iter().map(|mesh| tree(mesh)).collect();
     let obstacles: Vec<&TriangleTree> = trees.iter().map(Arc::as_ref).collect();
-    let skin = cx.part(SKIN).or(colliders.first().copied()).map(Surface::of);
+    let skin = cx.part(SKIN).or(colliders.first().copied()).map(skin);
     let blend = cx.mask(BLEND, curves)?;
     let factors = Group::of(&cx.get(GROUP), curves)?.map(|group| group.factors(blend));
     let offset_root = cx.mask(OFFSET_ROOT, curves)?.map(f64::from);
     let mut how = Collide {
         obstacles: &obstacles,
-        skin: skin.as_ref().map(Surface::skin),
+        skin: skin.as_deref().map(SkinMesh::surface),
         method: match cx.get(METHOD) {
             Method::Exact => ContactMethod::Exact,
             Method::Steps => ContactMethod::Steps(cx.get(ROTATION_STEPS) as u32),

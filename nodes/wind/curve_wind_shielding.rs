@@ -128,16 +128,20 @@ fn cook(cx: &Cx) -> Result<Outputs> {
 
     cx.publish(SHELTERED, shielded.iter().filter(|share| **share > 0.0).count() as f64);
     cx.publish(RAYS, cast as f64);
-    let lost = {
+    let (envelope, lost) = {
         let shield = cx.mask(SHIELD, &curves)?;
         let factors = group.map(|group| group.factors(shield));
-        shelter(&curves, &shielded, group::masked(shield, factors.as_deref()))
+        let shield = group::masked(shield, factors.as_deref());
+        let is_scaled = amount > 0.0 || curves.get(ENVELOPE).is_none();
+        (
+            is_scaled.then(|| scaled(&curves, &shielded, shield)),
+            cx.wants(SHELTER).then(|| shelter(&curves, &shielded, shield)),
+        )
     };
-    if amount > 0.0 || curves.get(ENVELOPE).is_none() {
-        let envelope = scaled(&curves, &lost);
+    if let Some(envelope) = envelope {
         curves.set(ENVELOPE, envelope)?;
     }
-    if cx.wants(SHELTER) {
+    if let Some(lost) = lost {
         curves.set(SHELTER, lost)?;
     }
     if cx.wants(SHIELDED) {
@@ -195,16 +199,28 @@ impl<'m> Wall<'m> {
     }
 }
 
-/// The share of the wind that each CV loses, 0…1.
+/// The share of the wind that CV `cv` loses, 0…1.
+#[inline(always)]
+fn lost_at(cv: usize, shielded: f32, amount: &Masked<'_, f32>) -> f32 {
+    (shielded * amount.at(cv)).clamp(0.0, 1.0)
+}
+
+/// The share of the wind that each CV loses.
 fn shelter(curves: &Component, shielded: &[f32], amount: Masked<'_, f32>) -> Vec<f32> {
-    let cvs = curves.runs().ranges().zip(shielded);
-    cvs.flat_map(|(cvs, share)| cvs.map(move |cv| (share * amount.at(cv)).clamp(0.0, 1.0))).collect()
+    let mut lost = vec![0.0; curves.point_count()];
+    for (cvs, shielded) in curves.runs().ranges().zip(shielded) {
+        lost[cvs.clone()].iter_mut().zip(cvs).for_each(|(lost, cv)| *lost = lost_at(cv, *shielded, &amount));
+    }
+    lost
 }
 
 /// The envelope, 1 if missing, less the share that each CV loses.
-fn scaled(curves: &Component, lost: &[f32]) -> Vec<f32> {
+fn scaled(curves: &Component, shielded: &[f32], amount: Masked<'_, f32>) -> Vec<f32> {
     let mut envelope = curves.get(ENVELOPE).map_or_else(|| vec![1.0; curves.point_count()], <[f32]>::to_vec);
-    envelope.iter_mut().zip(lost).for_each(|(envelope, lost)| *envelope *= 1.0 - lost);
+    for (cvs, shielded) in curves.runs().ranges().zip(shielded) {
+        let rows = envelope[cvs.clone()].iter_mut().zip(cvs);
+        rows.for_each(|(envelope, cv)| *envelope *= 1.0 - lost_at(cv, *shielded, &amount));
+    }
     envelope
 }
 

@@ -1,10 +1,10 @@
-//! Bodies that fur grows on: closed meshes, counter-clockwise from outside, some metres in size.
+//! Bodies that fur grows on: closed meshes and a plane, counter-clockwise from outside, some metres in size.
 
 use numerics::shapes::icosphere;
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 use std::collections::BTreeMap;
 
-/// A closed triangle mesh.
+/// A triangle mesh.
 pub(crate) struct Body {
     pub(crate) points: Vec<Vec3>,
     pub(crate) triangles: Vec<[u32; 3]>,
@@ -23,8 +23,15 @@ impl Body {
             "knot" => Self::knot(),
             "camel" => Self::around(|p| union(&camel(), p)),
             "folds" => Self::around(|p| union(&camel(), p) + folds(p)),
-            _ => panic!("`{name}`; expected camel, folds, knot or sphere"),
+            "plane" => Self::plane(),
+            _ => panic!("`{name}`; expected camel, folds, knot, plane or sphere"),
         }
+    }
+
+    /// A square of 3 m that faces up.
+    fn plane() -> Self {
+        let points = [[-1.5, 0.0, -1.5], [-1.5, 0.0, 1.5], [1.5, 0.0, 1.5], [1.5, 0.0, -1.5]];
+        Self { points: points.to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]] }
     }
 
     /// Of radius 1.

@@ -5,12 +5,17 @@
 //! [coherence=X]… [loft=X] [curves=N] [pairs=N]`. 10,000 curves of 7 CVs; wind turns by 1° a frame. Each row compares `pairs` pairs
 //! of samples: a frame apart (still, moving), an eighth of one (eighths) or a quarter (storm). Jumps are tips that move by
 //! more than a quarter of their length; those are added whose curves do not jump in the wind alone.
+//!
+//! `… --bin coherence_study heights`: which heights above the skin `offset_scale` 1 and 0.5 keep, on these bodies and a plane. `unfreed`: which segments cross in a storm.
 
 mod bodies;
+mod crossing;
+mod heights;
 mod scene;
 
 use bodies::Body;
 use curves::collide::{Collide, Collided, ContactMethod, SkinSurface, collide};
+use heights::Heights;
 use numerics::vector::{Vec3, length, sub};
 use scene::{CVS, Case, Groom, Sample};
 
@@ -30,6 +35,12 @@ fn main() {
         if named.is_empty() { all.to_vec() } else { named }
     };
     let (curves, pairs) = (number("curves=", 10_000.0) as usize, number("pairs=", 36.0) as usize);
+    if words.iter().any(|word| word == "unfreed") {
+        return print_unfreed(curves);
+    }
+    if words.iter().any(|word| word == "heights") {
+        return print_heights(curves);
+    }
     let loft = number("loft=", 0.0);
     let mut coherences = numbers("coherence=");
     if coherences.is_empty() {
@@ -78,21 +89,61 @@ fn compared(
     (sums, wind)
 }
 
+/// Segments that cross in each of 48 frames of a storm, without coherence.
+fn print_unfreed(curves: usize) {
+    println!("body    segments that cross in 48 frames  of curves free at rest");
+    for body in ["camel", "folds", "knot", "sphere"] {
+        let groom = Groom::on(Body::named(body), curves);
+        let (mut all, mut of_free) = (0, 0);
+        for frame in 0..48 {
+            let sample = groom.at(Case::Storm, f64::from(frame));
+            let out = collided(&groom, &sample, 0.0, 0.0);
+            for curve in (0..out.crossings.len()).filter(|curve| out.crossings[*curve] > 0) {
+                let crossings = out.crossings[curve];
+                all += crossings;
+                of_free += if crossing::is_free_at_rest(&groom, &sample, &out.points, curve) { crossings } else { 0 };
+            }
+        }
+        println!("{body:7} {all:32} {of_free:23}");
+    }
+}
+
+fn print_heights(curves: usize) {
+    println!("body    offset_scale  pressed CVs  at most 2 % low  5 % low  within 5 %  length error");
+    for body in ["plane", "camel", "folds", "knot", "sphere"] {
+        let groom = Groom::on(Body::named(body), curves);
+        for share in [1.0, 0.5] {
+            let heights = Heights::on(&groom, share, 12);
+            let [two, five, within] = heights.percents();
+            println!(
+                "{body:7} {share:12} {:12} {two:14.2} % {five:6.2} % {within:9.2} % {:13.1e}",
+                heights.pressed, heights.length_error
+            );
+        }
+    }
+}
+
 fn collided(groom: &Groom, sample: &Sample, coherence: f64, loft: f64) -> Collided {
-    let how = Collide {
-        obstacles: &[&sample.tree],
+    collided_with(groom, sample, |how| Collide { coherence: coherence.into(), loft: loft.into(), ..how })
+}
+
+/// Curves collided, with what `set` makes of the settings of the node's defaults.
+fn collided_with<'a>(groom: &'a Groom, sample: &'a Sample, set: impl FnOnce(Collide<'a>) -> Collide<'a>) -> Collided {
+    let obstacles = [&sample.tree];
+    let how = set(Collide {
+        obstacles: &[],
         skin: Some(SkinSurface { tree: &sample.tree, triangles: &groom.body.triangles, normals: &sample.normals }),
         method: ContactMethod::Exact,
         gap: 1e-4.into(),
         offset_root: 1e-4.into(),
         offset_scale: None,
-        loft: loft.into(),
-        coherence: coherence.into(),
+        loft: 0.0.into(),
+        coherence: 0.0.into(),
         at_rest: None,
         blend: 1.0.into(),
         width: 0.0.into(),
-    };
-    collide(&groom.starts, &sample.rest, &sample.goal, &how)
+    });
+    collide(&groom.starts, &sample.rest, &sample.goal, &Collide { obstacles: &obstacles, ..how })
 }
 
 /// What pairs of samples add up to.

@@ -84,6 +84,11 @@ impl Groom {
         Sample { tree: TriangleTree::build(&points, &self.body.triangles), normals, rest, goal }
     }
 
+    /// Whether a point is judged: not where the plane ends within reach of its curve.
+    pub(crate) fn is_judged(&self, p: Vec3) -> bool {
+        self.body.points.len() > 4 || (p[0].abs() < 1.3 && p[2].abs() < 1.3)
+    }
+
     fn blown(&self, case: Case, frame: f64, rest: &[Vec3]) -> Vec<Vec3> {
         let storm = case == Case::Storm;
         let time = frame / 24.0;

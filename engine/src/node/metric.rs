@@ -77,9 +77,9 @@ impl Metric {
 
     /// The share of curves whose tips jump. The engine computes it, and the node does not publish it.
     pub const fn jumps() -> Self {
-        let help = "Share of curves whose tips move by more than a quarter of their length between consecutive samples of \
-            the request, in the report only; the first sample has none. With samples at eighths of a frame speed counts \
-            little, and jumps are left.";
+        let help = "Share of curves whose tip moves by more than a quarter of the curve's length from one requested \
+            sample to the next. In the report only; the first sample has none. Fast motion counts too: request eighths \
+            of a frame to see jumps alone.";
         Self { is_of_jumps: true, ..Self::new("jumps", Unit::None, help) }
     }
 

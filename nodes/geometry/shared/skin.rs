@@ -1,32 +1,15 @@
-//! A mesh that curves grow on, in the form that kernels take; computed once for a still mesh.
+//! A mesh that curves grow on, in the form that kernels take.
 
 use std::sync::Arc;
 
-use curves::collide::{SkinSurface, normals};
-use engine::geometry::{Component, Triangles};
+use curves::collide::SkinMesh;
+use engine::geometry::Component;
 use numerics::tree::TriangleTree;
 
-/// Tree, triangles and normals of a mesh.
-pub(crate) struct Skin {
-    tree: Arc<TriangleTree>,
-    triangles: Arc<Triangles>,
-    normals: Arc<Normals>,
-}
-
-/// Outward normals of a mesh's points.
-struct Normals(Vec<[f32; 3]>);
-
-impl Skin {
-    /// The skin of a mesh.
-    pub(crate) fn of(mesh: &Component) -> Self {
-        let triangles = mesh.triangles();
-        let tree = mesh.derived(|mesh| TriangleTree::build(mesh.positions(), &triangles.corners));
-        let normals = mesh.derived(|mesh| Normals(normals(mesh.positions(), &triangles.corners)));
-        Self { tree, triangles, normals }
-    }
-
-    /// The form that kernels take.
-    pub(crate) fn surface(&self) -> SkinSurface<'_> {
-        SkinSurface { tree: &self.tree, triangles: &self.triangles.corners, normals: &self.normals.0 }
-    }
+/// The skin of a mesh; computed once while it does not move, also for nodes of other families.
+pub(crate) fn skin(mesh: &Component) -> Arc<SkinMesh> {
+    mesh.derived(|mesh| {
+        let (points, triangles) = (mesh.positions(), &mesh.triangles().corners);
+        SkinMesh::new(mesh.derived(|_| TriangleTree::build(points, triangles)), points, triangles)
+    })
 }

@@ -1,9 +1,9 @@
-//! A mesh as a collider: a tree of its triangles, and its normals; computed once for a still mesh.
+//! A mesh as a collider, and as a skin: computed once while it does not move.
 
 use std::sync::Arc;
 
-use curves::collide::{SkinSurface, normals};
-use engine::geometry::{Component, Triangles};
+use curves::collide::SkinMesh;
+use engine::geometry::Component;
 use numerics::tree::TriangleTree;
 
 /// The tree of a mesh's triangles.
@@ -12,30 +12,6 @@ pub(crate) fn tree(mesh: &Component) -> Arc<TriangleTree> {
 }
 
 /// A mesh that curves grow on.
-pub(crate) struct Surface {
-    tree: Arc<TriangleTree>,
-    triangles: Arc<Triangles>,
-    normals: Arc<Normals>,
-}
-
-/// Outward normals of a mesh's points.
-struct Normals(Vec<[f32; 3]>);
-
-impl Surface {
-    /// The surface of a mesh.
-    pub(crate) fn of(mesh: &Component) -> Self {
-        let triangles = mesh.triangles();
-        let normals = mesh.derived(|mesh| Normals(normals(mesh.positions(), &triangles.corners)));
-        Self { tree: tree(mesh), triangles, normals }
-    }
-
-    /// The tree of its triangles.
-    pub(crate) fn tree(&self) -> &Arc<TriangleTree> {
-        &self.tree
-    }
-
-    /// The form that the kernel takes.
-    pub(crate) fn skin(&self) -> SkinSurface<'_> {
-        SkinSurface { tree: &self.tree, triangles: &self.triangles.corners, normals: &self.normals.0 }
-    }
+pub(crate) fn skin(mesh: &Component) -> Arc<SkinMesh> {
+    mesh.derived(|mesh| SkinMesh::new(tree(mesh), mesh.positions(), &mesh.triangles().corners))
 }

@@ -14,10 +14,12 @@ mod closest;
 mod split;
 mod visit;
 
-use crate::lanes::{F32x16, LANES, Lanes, set};
+use crate::lanes::{F32x16, LANES, Lanes, get, set};
 use crate::parallel;
+use crate::simd::{Path, kernel};
 use crate::vector::Vec3;
 pub use closest::Closest;
+use std::sync::Arc;
 pub use visit::{Cuboid, Region, Walk};
 
 /// The index of a lane that holds no triangle.
@@ -54,8 +56,8 @@ const TASK: usize = 64;
 /// The tree. A default one is empty.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleTree {
-    /// Points and index of the triangle of each lane of each block.
-    members: Vec<Member>,
+    /// Points and index of the triangle of each lane of each block; shared by trees of the same triangles.
+    members: Arc<Vec<Member>>,
     blocks: Vec<Block>,
     /// `levels[0]` has a lane a block, every other level a lane for each box of the previous one; the last has one box.
     levels: Vec<Vec<Boxes>>,
@@ -76,7 +78,7 @@ impl TriangleTree {
     pub fn build(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let order = split::order(points, triangles);
         let member = |&triangle: &u32| Member { points: triangles[triangle as usize], triangle };
-        let mut tree = Self { members: order.iter().map(member).collect(), ..Self::default() };
+        let mut tree = Self { members: Arc::new(order.iter().map(member).collect()), ..Self::default() };
         tree.refit(points);
         tree
     }
@@ -97,8 +99,9 @@ impl TriangleTree {
     /// # Panics
     /// Where there are fewer points than the tree was built on.
     pub fn refit(&mut self, points: &[Vec3]) {
+        let path = Path::chosen();
         self.blocks.resize(self.members.len().div_ceil(LANES), Block::empty());
-        refill(&mut self.blocks, &self.members, |members| Block::of(points, members));
+        refill(&mut self.blocks, &self.members, |blocks, members| refit_blocks(path, points, members, blocks));
         let mut level = 0;
         let mut rows = self.blocks.len();
         while rows > 1 || (level == 0 && rows > 0) {
@@ -108,8 +111,8 @@ impl TriangleTree {
             let (below, above) = self.levels.split_at_mut(level);
             above[0].resize(rows.div_ceil(LANES), Boxes::empty());
             match below.last() {
-                None => refill(&mut above[0], &self.blocks, |blocks| Boxes::around(blocks, Block::bounds)),
-                Some(boxes) => refill(&mut above[0], boxes, |boxes| Boxes::around(boxes, Boxes::bounds)),
+                None => refill(&mut above[0], &self.blocks, |boxes, blocks| around_blocks(path, blocks, boxes)),
+                Some(below) => refill(&mut above[0], below, |boxes, below| around_boxes(path, below, boxes)),
             }
             rows = above[0].len();
             level += 1;
@@ -138,11 +141,53 @@ impl TriangleTree {
     }
 }
 
-/// Sets each element to what `value` makes of the sixteen things below it.
-fn refill<T: Send, U: Sync>(elements: &mut [T], below: &[U], value: impl Fn(&[U]) -> T + Sync) {
+/// Sets elements, some in each piece of work, to what `fill` makes of those below them, sixteen for each.
+fn refill<T: Send, U: Sync>(elements: &mut [T], below: &[U], fill: impl Fn(&mut [T], &[U]) + Sync) {
     parallel::for_each(elements.chunks_mut(TASK).zip(below.chunks(TASK * LANES)), |_, (elements, below)| {
-        elements.iter_mut().zip(below.chunks(LANES)).for_each(|(element, below)| *element = value(below));
+        fill(elements, below);
     });
+}
+
+kernel! {
+    /// The blocks of `members`.
+    fn refit_blocks(points: &[Vec3], members: &[Member], blocks: &mut [Block]) = refit_blocks_body;
+}
+
+#[inline(always)]
+fn refit_blocks_body(points: &[Vec3], members: &[Member], blocks: &mut [Block]) {
+    for (block, members) in blocks.iter_mut().zip(members.chunks(LANES)) {
+        block.set(points, members);
+    }
+}
+
+kernel! {
+    /// The boxes around blocks.
+    fn around_blocks(blocks: &[Block], boxes: &mut [Boxes]) = around_blocks_body;
+}
+
+#[inline(always)]
+fn around_blocks_body(blocks: &[Block], boxes: &mut [Boxes]) {
+    for (boxes, blocks) in boxes.iter_mut().zip(blocks.chunks(LANES)) {
+        *boxes = Boxes::empty();
+        for (lane, block) in blocks.iter().enumerate() {
+            boxes.set(lane, block.bounds());
+        }
+    }
+}
+
+kernel! {
+    /// The boxes around boxes.
+    fn around_boxes(below: &[Boxes], boxes: &mut [Boxes]) = around_boxes_body;
+}
+
+#[inline(always)]
+fn around_boxes_body(below: &[Boxes], boxes: &mut [Boxes]) {
+    for (boxes, below) in boxes.iter_mut().zip(below.chunks(LANES)) {
+        *boxes = Boxes::empty();
+        for (lane, one) in below.iter().enumerate() {
+            boxes.set(lane, one.bounds());
+        }
+    }
 }
 
 impl Block {
@@ -150,25 +195,45 @@ impl Block {
         Self { corners: [[F32x16::splat(0.0); 3]; 3], triangle: [NONE; LANES] }
     }
 
-    /// The block of up to sixteen triangles.
-    fn of(points: &[Vec3], members: &[Member]) -> Self {
-        let corners = |member: &Member| member.points.map(|point| points[point as usize]);
-        let finite = |corners: &[Vec3; 3]| corners.iter().flatten().all(|x| x.is_finite());
-        let first = members.iter().map(corners).find(finite).unwrap_or_default();
-        let mut block = Self { corners: first.map(|corner| corner.map(F32x16::splat)), triangle: [NONE; LANES] };
+    /// Sets it to up to sixteen triangles.
+    #[inline(always)]
+    fn set(&mut self, points: &[Vec3], members: &[Member]) {
+        *self = Self::empty();
+        let mut first = LANES;
         for (lane, member) in members.iter().enumerate() {
-            let corners = corners(member);
-            if finite(&corners) {
-                block.triangle[lane] = member.triangle;
-                for (to, corner) in block.corners.iter_mut().zip(corners) {
-                    set(to, lane, corner);
-                }
+            let [a, b, c] = member.points;
+            let corners = [points[a as usize], points[b as usize], points[c as usize]];
+            let mut finite = true;
+            for corner in &corners {
+                finite &= corner[0].is_finite() & corner[1].is_finite() & corner[2].is_finite();
+            }
+            if finite {
+                self.put(lane, corners);
+                self.triangle[lane] = member.triangle;
+                first = if first == LANES { lane } else { first };
             }
         }
-        block
+        if first == LANES {
+            return;
+        }
+        let [a, b, c] = &self.corners;
+        let repeated = [get(a, first), get(b, first), get(c, first)];
+        for lane in 0..LANES {
+            if self.triangle[lane] == NONE {
+                self.put(lane, repeated);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn put(&mut self, lane: usize, corners: [Vec3; 3]) {
+        for (to, corner) in self.corners.iter_mut().zip(corners) {
+            set(to, lane, corner);
+        }
     }
 
     /// Lowest and highest corner of the triangles: those of an empty box where there is none.
+    #[inline(always)]
     fn bounds(&self) -> (Vec3, Vec3) {
         if self.triangle == [NONE; LANES] {
             return (EMPTY_LOW, EMPTY_HIGH);
@@ -181,13 +246,12 @@ impl Block {
     #[inline(always)]
     pub fn boxes(&self) -> Boxes {
         let [a, b, c] = &self.corners;
-        let mut boxes = Boxes { low: *a, high: *a };
-        // No closures here: they are not compiled for a kernel's path.
-        for axis in 0..3 {
-            boxes.low[axis] = a[axis].least(&b[axis]).least(&c[axis]);
-            boxes.high[axis] = a[axis].most(&b[axis]).most(&c[axis]);
+        // No closures here: they are not compiled for a kernel's path. No loop over the axes either: the compiler vectorises
+        // it, with a gather for each lane.
+        Boxes {
+            low: [a[0].least(&b[0]).least(&c[0]), a[1].least(&b[1]).least(&c[1]), a[2].least(&b[2]).least(&c[2])],
+            high: [a[0].most(&b[0]).most(&c[0]), a[1].most(&b[1]).most(&c[1]), a[2].most(&b[2]).most(&c[2])],
         }
-        boxes
     }
 }
 
@@ -196,22 +260,29 @@ impl Boxes {
         Self { low: EMPTY_LOW.map(F32x16::splat), high: EMPTY_HIGH.map(F32x16::splat) }
     }
 
-    /// The boxes of up to sixteen items.
-    fn around<T>(things: &[T], bounds: impl Fn(&T) -> (Vec3, Vec3)) -> Self {
-        let mut boxes = Self::empty();
-        for (lane, thing) in things.iter().enumerate() {
-            let (low, high) = bounds(thing);
-            set(&mut boxes.low, lane, low);
-            set(&mut boxes.high, lane, high);
-        }
-        boxes
+    /// Replaces the box of a lane.
+    #[inline(always)]
+    fn set(&mut self, lane: usize, (low, high): (Vec3, Vec3)) {
+        set(&mut self.low, lane, low);
+        set(&mut self.high, lane, high);
     }
 
     /// The box around all lanes.
+    #[inline(always)]
     fn bounds(&self) -> (Vec3, Vec3) {
-        let low = |axis: usize| self.low[axis].0.iter().fold(f32::INFINITY, |low, x| least(low, *x));
-        let high = |axis: usize| self.high[axis].0.iter().fold(f32::NEG_INFINITY, |high, x| most(high, *x));
-        ([low(0), low(1), low(2)], [high(0), high(1), high(2)])
+        let (mut low, mut high) = (self.low, self.high);
+        // Halves, quarters…: a lane after another would be a chain of sixteen.
+        let mut width = LANES / 2;
+        while width > 0 {
+            for axis in 0..3 {
+                for lane in 0..width {
+                    low[axis].0[lane] = least(low[axis].0[lane], low[axis].0[lane + width]);
+                    high[axis].0[lane] = most(high[axis].0[lane], high[axis].0[lane + width]);
+                }
+            }
+            width /= 2;
+        }
+        (get(&low, 0), get(&high, 0))
     }
 }
 

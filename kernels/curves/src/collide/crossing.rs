@@ -1,7 +1,7 @@
 //! Whether a segment crosses a triangle: in f64, on the f32 positions that are written.
 
 use super::triangle_filter::may_cross;
-use numerics::lanes::get;
+use numerics::lanes::Lanes;
 use numerics::tree::{Block, Boxes, Cuboid, Region, TriangleTree};
 use numerics::vector::{DVec3, Vec3, to_f64};
 
@@ -23,7 +23,13 @@ const FEW: u32 = 1;
 #[inline(always)]
 pub(super) fn corners(block: &Block, lane: usize) -> [DVec3; 3] {
     let [a, b, c] = &block.corners;
-    [to_f64(get(a, lane)), to_f64(get(b, lane)), to_f64(get(c, lane))]
+    [corner(a, lane), corner(b, lane), corner(c, lane)]
+}
+
+/// The vector of one lane. Without a loop over the axes, which the compiler would make a gather of three.
+#[inline(always)]
+fn corner(lanes: &Lanes<3>, lane: usize) -> DVec3 {
+    to_f64([lanes[0].0[lane], lanes[1].0[lane], lanes[2].0[lane]])
 }
 
 /// Where the segment from `a` to `b` crosses the triangle; touching counts. `None` in the triangle's own plane.

@@ -35,7 +35,7 @@ use numerics::tree::TriangleTree;
 use numerics::vector::{DVec3, Vec3};
 use rest::at_rest_on;
 pub use rest::{AtRest, at_rest};
-pub use skin::{SkinSurface, normals};
+pub use skin::{SkinMesh, SkinSurface, normals};
 use std::ops::Range;
 
 /// How a segment's turn is stopped.

@@ -5,6 +5,7 @@ use super::crossing::corners;
 use super::perpendicular;
 use numerics::tree::{Closest, Cuboid, TriangleTree};
 use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
+use std::sync::Arc;
 
 /// Largest number of turns that raise a segment.
 const TURNS: usize = 3;
@@ -21,6 +22,34 @@ pub struct SkinSurface<'a> {
     pub triangles: &'a [[u32; 3]],
     /// Outward normal of each point, of any length; see [`normals`].
     pub normals: &'a [Vec3],
+}
+
+/// What a [`SkinSurface`] borrows: made once for a skin that is still, whichever node asks for it.
+#[derive(Clone, Debug)]
+pub struct SkinMesh {
+    tree: Arc<TriangleTree>,
+    triangles: Vec<[u32; 3]>,
+    normals: Vec<Vec3>,
+}
+
+impl SkinMesh {
+    /// The skin of `triangles`, each three indices of `points` (metres), counter-clockwise from outside; `tree` is over them.
+    ///
+    /// # Panics
+    /// If an index is out of range.
+    pub fn new(tree: Arc<TriangleTree>, points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        Self { tree, triangles: triangles.to_vec(), normals: normals(points, triangles) }
+    }
+
+    /// The tree of its triangles.
+    pub fn tree(&self) -> &Arc<TriangleTree> {
+        &self.tree
+    }
+
+    /// The form that kernels take.
+    pub fn surface(&self) -> SkinSurface<'_> {
+        SkinSurface { tree: &self.tree, triangles: &self.triangles, normals: &self.normals }
+    }
 }
 
 /// Outward normals of the points of a mesh, each the mean of its triangles' normals weighted by their angles there, so

@@ -43,12 +43,6 @@ fn body(
     let origin = points[0];
     let mut at = [[F32x16::splat(0.0); 3]; ROWS];
     let mut sums = [Sum { value: F32x16::splat(0.0), reached: [0; LANES] }; ROWS];
-    for (out, sum) in out.chunks(LANES).zip(&mut sums) {
-        // Lanes without a point repeat the last.
-        for lane in 0..LANES {
-            sum.value.0[lane] = out[lane.min(out.len() - 1)];
-        }
-    }
     let scales = scales(factors, points.len());
     let mut loaded = false;
     for first in (0..near.len()).step_by(LANES) {
@@ -58,6 +52,9 @@ fn body(
         }
         if !loaded {
             load(points, origin, &mut at);
+            for (out, sum) in out.chunks(LANES).zip(&mut sums) {
+                sum.start(out);
+            }
             loaded = true;
         }
         for lane in (0..LANES).filter(|lane| met[*lane] != 0) {
@@ -91,6 +88,9 @@ fn body(
         if prepared.only_adds && sums[..rows].iter().all(Sum::is_full) {
             break;
         }
+    }
+    if !loaded {
+        return 0;
     }
     let mut reached = 0;
     for (out, sum) in out.chunks_mut(LANES).zip(&sums) {
@@ -149,6 +149,18 @@ struct Sum {
 }
 
 impl Sum {
+    /// Starts with these values; lanes without a point repeat the last.
+    #[inline(always)]
+    fn start(&mut self, values: &[f32]) {
+        if values.len() == LANES {
+            self.value.0.copy_from_slice(values);
+            return;
+        }
+        for lane in 0..LANES {
+            self.value.0[lane] = values[lane.min(values.len() - 1)];
+        }
+    }
+
     /// Adds `influence` × `strength` × `scale` if `share` lies within the boundary.
     #[inline(always)]
     fn add(&mut self, share: &F32x16, influence: &F32x16, strength: f32, scale: Option<&F32x16>) {

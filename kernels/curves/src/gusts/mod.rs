@@ -126,7 +126,8 @@ pub fn evaluate(points: &[[f32; 3]], gusts: &Gusts<'_>) -> Influence {
 /// As [`evaluate()`].
 pub fn evaluate_on(path: Path, points: &[[f32; 3]], gusts: &Gusts<'_>) -> Influence {
     let prepared = Prepared::new(gusts);
-    let base = gusts.base.clamp(0.0, 1.0);
+    // Never −0: blocks that no gust reaches keep it.
+    let base = gusts.base.clamp(0.0, 1.0) + 0.0;
     let mut values = match gusts.masks.base {
         Some(mask) => mask[..points.len()].iter().map(|factor| (base * at_least_0(*factor)).min(1.0)).collect(),
         None => vec![base; points.len()],

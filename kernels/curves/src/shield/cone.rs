@@ -42,21 +42,79 @@ kernel! {
     pub(super) fn cover(
         obstacles: &[Obstacle],
         views: &[View],
-        fade: Option<Fade>,
         cone: f32,
         covered: &mut [f32],
-    ) = body;
+    ) = body_without_fade;
+}
+
+kernel! {
+    /// The same where what is covered counts by its distance.
+    pub(super) fn cover_fading(
+        obstacles: &[Obstacle],
+        views: &[View],
+        fade: Fade,
+        cone: f32,
+        covered: &mut [f32],
+    ) = body_with_fade;
 }
 
 #[inline(always)]
-fn body(obstacles: &[Obstacle], views: &[View], fade: Option<Fade>, cone: f32, covered: &mut [f32]) {
+fn body_without_fade(obstacles: &[Obstacle], views: &[View], cone: f32, covered: &mut [f32]) {
+    body(obstacles, views, NoFade, cone, covered);
+}
+
+#[inline(always)]
+fn body_with_fade(obstacles: &[Obstacle], views: &[View], fade: Fade, cone: f32, covered: &mut [f32]) {
+    body(obstacles, views, fade, cone, covered);
+}
+
+/// How much what is covered counts by its distance. A type and not an `Option`, so that without it nothing is computed:
+/// a branch within a loop over lanes computes both sides.
+trait DistanceWeight: Copy {
+    /// Beyond this distance nothing counts, of at most `end`.
+    fn farthest(self, end: f32) -> f32;
+
+    /// `weight`, by the distance.
+    fn weigh(self, weight: f32, distance: f32) -> f32;
+}
+
+/// All distances count alike.
+#[derive(Clone, Copy)]
+struct NoFade;
+
+impl DistanceWeight for NoFade {
+    #[inline(always)]
+    fn farthest(self, end: f32) -> f32 {
+        end
+    }
+
+    #[inline(always)]
+    fn weigh(self, weight: f32, _: f32) -> f32 {
+        weight
+    }
+}
+
+impl DistanceWeight for Fade {
+    #[inline(always)]
+    fn farthest(self, end: f32) -> f32 {
+        Reach { end, fade: Some(self) }.farthest()
+    }
+
+    #[inline(always)]
+    fn weigh(self, weight: f32, distance: f32) -> f32 {
+        weight * self.weight(distance)
+    }
+}
+
+#[inline(always)]
+fn body<W: DistanceWeight>(obstacles: &[Obstacle], views: &[View], fade: W, cone: f32, covered: &mut [f32]) {
     let (sine, cosine) = trig::sin_cos(cone);
     for (view, covered) in views.iter().zip(covered) {
         let mut sums = [F32x16::splat(0.0); 2];
-        let reach = Reach { end: view.reach, fade };
         for obstacle in obstacles {
             let gap = view.gap.at(obstacle.size);
-            let cone = Cone { at: view.at, slope: sine / cosine, reach, farthest: reach.farthest(), gap };
+            let farthest = fade.farthest(view.reach);
+            let cone = Cone { at: view.at, slope: sine / cosine, end: view.reach, fade, farthest, gap };
             cone.look(obstacle, &mut sums);
         }
         let (mut front, mut back) = (0.0, 0.0);
@@ -72,17 +130,19 @@ fn body(obstacles: &[Obstacle], views: &[View], fade: Option<Fade>, cone: f32, c
 }
 
 /// A cone upwind of a CV.
-struct Cone {
+struct Cone<W> {
     at: Vec3,
     /// Radius ÷ distance.
     slope: f32,
-    reach: Reach,
+    /// Where the offset ends.
+    end: f32,
+    fade: W,
     /// Beyond this distance nothing counts.
     farthest: f32,
     gap: f32,
 }
 
-impl Cone {
+impl<W: DistanceWeight> Cone<W> {
     /// Adds how many times the mesh covers the disc with front and with back faces, on average; spread over the lanes.
     #[inline(always)]
     fn look(&self, obstacle: &Obstacle, sums: &mut [F32x16; 2]) {
@@ -166,18 +226,14 @@ impl Cone {
     /// it fades.
     #[inline(always)]
     fn weight(&self, distance: f32) -> f32 {
-        let weight = (1.0 - distance / self.reach.end) * (1.0 / FADE);
+        let weight = (1.0 - distance / self.end) * (1.0 / FADE);
         let weight = if weight > 0.0 { weight } else { 0.0 };
         let weight = if weight < 1.0 { weight } else { 1.0 };
-        match self.reach.fade {
-            Some(fade) => weight * fade.weight(distance),
-            None => weight,
-        }
+        self.fade.weigh(weight, distance)
     }
 
     /// Contribution of an edge to the mean over the disc: an integral over the part of it inside the disc, as seen from
-    /// the
-    /// centre. The surface is on the left of the edge.
+    /// the centre. The surface is on the left of the edge.
     #[inline(always)]
     fn edge(&self, from: Vec3, to: Vec3) -> f32 {
         let (start, end) = self.near_the_cone(from, to);
@@ -233,7 +289,7 @@ impl Cone {
     }
 }
 
-impl Region for &Cone {
+impl<W> Region for &Cone<W> {
     #[inline(always)]
     fn meeting(&self, boxes: &Boxes) -> u16 {
         let mut mask = 0;

@@ -26,7 +26,7 @@ use frame::Frame;
 use numerics::lanes::{F32x16, LANES, get};
 use numerics::masked::Masked;
 use numerics::parallel;
-use numerics::simd::Path;
+use numerics::simd::{Path, kernel};
 use numerics::tree::{Block, TriangleTree};
 use numerics::trig;
 use numerics::vector::{self, Vec3};
@@ -172,12 +172,13 @@ pub fn shield_on(
         let tasks = covered.chunks_mut(TASK_GROUPS * LANES).zip(views.sorted().chunks(TASK_GROUPS * LANES));
         parallel::for_each(tasks, |_, (covered, views)| {
             for (covered, views) in covered.chunks_mut(LANES).zip(views.chunks(LANES)) {
-                if shield.cone > 0.0 {
-                    cone::cover(path, &obstacles, views, fade, shield.cone, covered);
-                } else if let Some(fade) = fade {
-                    rays::cover_nearest(path, &obstacles, views, fade, covered);
-                } else {
-                    rays::cover(path, &obstacles, views, covered);
+                match fade {
+                    None if shield.cone > 0.0 => cone::cover(path, &obstacles, views, shield.cone, covered),
+                    Some(fade) if shield.cone > 0.0 => {
+                        cone::cover_fading(path, &obstacles, views, fade, shield.cone, covered);
+                    }
+                    None => rays::cover(path, &obstacles, views, covered),
+                    Some(fade) => rays::cover_nearest(path, &obstacles, views, fade, covered),
                 }
             }
         });
@@ -213,6 +214,22 @@ fn share(cvs: &[u32], covered: &[f32]) -> f32 {
     if cvs.is_empty() { 0.0 } else { (sum / cvs.len() as f64) as f32 }
 }
 
+kernel! {
+    /// Twice the area of each triangle.
+    fn write_areas(blocks: &[Block], areas: &mut [F32x16]) = write_areas_body;
+}
+
+#[inline(always)]
+fn write_areas_body(blocks: &[Block], areas: &mut [F32x16]) {
+    for (areas, block) in areas.iter_mut().zip(blocks) {
+        let [a, b, c] = &block.corners;
+        for lane in 0..LANES {
+            let [a, b, c] = [get(a, lane), get(b, lane), get(c, lane)];
+            areas.0[lane] = vector::length(vector::cross(vector::sub(b, a), vector::sub(c, a)));
+        }
+    }
+}
+
 impl Obstacle {
     /// A collider in the frame.
     fn of(frame: &Frame, collider: &Collider<'_>, with_edges: bool) -> Self {
@@ -222,15 +239,9 @@ impl Obstacle {
             Some(tree) => tree.moved(&points),
             None => TriangleTree::build(&points, collider.triangles),
         };
-        let area = |block: &Block| {
-            let [a, b, c] = &block.corners;
-            F32x16::from_fn(|lane| {
-                let [a, b, c] = [get(a, lane), get(b, lane), get(c, lane)];
-                vector::length(vector::cross(vector::sub(b, a), vector::sub(c, a)))
-            })
-        };
-        let mut areas = vec![F32x16::splat(0.0); tree.blocks().len()];
-        parallel::fill(&mut areas, TASK_GROUPS, |block| area(&tree.blocks()[block]));
+        let (path, mut areas) = (Path::chosen(), vec![F32x16::splat(0.0); tree.blocks().len()]);
+        let tasks = areas.chunks_mut(TASK_GROUPS).zip(tree.blocks().chunks(TASK_GROUPS));
+        parallel::for_each(tasks, |_, (areas, blocks)| write_areas(path, blocks, areas));
         let (low, high) = tree.bounds();
         let size = (0..3).fold(0.0_f32, |size, axis| size.max(high[axis] - low[axis]));
         let edges = with_edges.then(|| match collider.neighbours {
