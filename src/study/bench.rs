@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use engine::clock::Stopwatch;
@@ -46,6 +46,8 @@ pub(super) struct Subject<'a> {
     pub(super) ceiling: Ceiling,
     pub(super) cancel: Arc<AtomicBool>,
     pub(super) progress: Progress,
+    /// What the first run leaves out that has points or curves without counterpart in the reference.
+    pub(super) unmatched: OnceLock<String>,
 }
 
 /// Time and memory of a run; times are milliseconds a frame.
@@ -110,13 +112,10 @@ pub(super) struct Reference {
 }
 
 impl Reference {
-    /// The largest coordinate: that which f32 stores least precisely.
-    pub(super) fn largest_coordinate(&self) -> f32 {
-        let of_frame = |geometry: &Arc<Geometry>| {
-            let numbers = geometry.parts().flat_map(|part| part.positions().as_flattened().iter().copied());
-            numbers.fold(0.0_f32, |largest, x| largest.max(x.abs()))
-        };
-        self.frames.values().map(of_frame).fold(0.0, f32::max)
+    /// What the storage of results as f32 may change of an error: four units in the last place of the largest number that is
+    /// compared. Of a volume, what moving the whole surface by that much would; nothing of a metric, which is not stored.
+    pub(super) fn rounding(&self, measure: &Measure) -> f64 {
+        self.frames.values().map(|geometry| measure.rounding(geometry)).fold(0.0, f64::max)
     }
 }
 
@@ -261,6 +260,16 @@ impl Subject<'_> {
             }
             let both = own.iter().filter_map(|(frame, value)| Some(value - reference.metric.get(frame)?));
             differences.extend(both.map(f64::abs));
+        }
+        let [unmatched, all] = differences.unmatched;
+        if unmatched > 0 {
+            let set: Vec<String> =
+                set_of(knobs, setting).into_iter().map(|(key, value)| format!("{key}={value}")).collect();
+            let _ = self.unmatched.set(format!(
+                "only what both results have is compared, matched by its id: with {} that is {:.3} % of what they have",
+                set.join(", "),
+                100.0 * (all - unmatched) as f64 / all as f64
+            ));
         }
         Ok(match Errors::of(differences) {
             Some(errors) => Run { setting: setting.to_vec(), result: Ok((cost, errors)) },

@@ -16,7 +16,9 @@ pub(super) fn both_ways(a: &Component, b: &Component, into: &mut Differences) ->
     match (a.topology(), b.topology()) {
         (Topology::Curves(of_a), Topology::Curves(of_b)) => {
             let mut ways = [Vec::new(), Vec::new()];
-            for (i, j) in element_pairs(a, b)? {
+            let pairs = element_pairs(a, b)?;
+            into.count(a.element_count() + b.element_count(), pairs.len());
+            for (i, j) in pairs {
                 let (p, q) = (&a.positions()[of_a.range(i)], &b.positions()[of_b.range(j)]);
                 let way = |from: &[[f32; 3]], to: &[[f32; 3]]| -> Vec<(f64, f64)> {
                     let distances = from.iter().map(|point| to_polyline(to_f64(*point), to));
@@ -84,6 +86,19 @@ impl<'a> Surface<'a> {
         }
         each.zip(used.iter().map(|point| areas[*point as usize])).collect()
     }
+}
+
+/// The area of a mesh, or of the faces that only one tet has.
+pub(super) fn area(part: &Component) -> f64 {
+    let triangles = match part.topology() {
+        Topology::Tets(tets) => boundary(tets),
+        _ => part.triangles().corners.clone(),
+    };
+    let area = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|corner| to_f64(part.positions()[corner as usize]));
+        (b - a).cross(&(c - a)).norm() / 2.0
+    };
+    triangles.iter().map(area).sum()
 }
 
 /// The faces that only one tet has.

@@ -197,7 +197,9 @@ fn each_part(
 fn points(a: &Component, b: &Component, into: &mut Differences) -> Result<(), String> {
     let (p, q) = (a.positions(), b.positions());
     let distance = |(i, j): (usize, usize)| (to_f64(p[i]) - to_f64(q[j])).norm();
-    into.extend(point_pairs(a, b)?.into_iter().map(distance));
+    let pairs = point_pairs(a, b)?;
+    into.count(p.len() + q.len(), pairs.len());
+    into.extend(pairs.into_iter().map(distance));
     Ok(())
 }
 
@@ -276,6 +278,7 @@ fn attribute(name: &str, a: &Geometry, b: &Geometry, into: &mut Differences) -> 
                 return Err(format!("the attribute `{name}` has another type in each of two results"));
             }
             let (p, q, width) = (rows(p), rows(q), p.kind().width());
+            into.count((p.len() + q.len()) / width, pairs.len());
             let row = |rows: &'_ [f64], row: usize| -> Vec<f64> { rows[row * width..(row + 1) * width].to_vec() };
             into.extend(
                 pairs.into_iter().map(|(i, j)| {
@@ -335,12 +338,16 @@ pub(super) struct Errors {
 
 /// Differences of two results with their weights.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Differences(Vec<(f64, f64)>);
+pub(super) struct Differences {
+    rows: Vec<(f64, f64)>,
+    /// How many points or elements only one of two results has, which are not compared; and how many there are in both.
+    pub(super) unmatched: [usize; 2],
+}
 
 impl Extend<f64> for Differences {
     /// Adds differences that count the same.
     fn extend<I: IntoIterator<Item = f64>>(&mut self, numbers: I) {
-        self.0.extend(numbers.into_iter().map(|number| (number, 1.0)));
+        self.rows.extend(numbers.into_iter().map(|number| (number, 1.0)));
     }
 }
 
@@ -352,20 +359,26 @@ impl Differences {
             let size: f64 = way.iter().map(|(_, size)| size).sum();
             let count = way.len() as f64;
             let weight = |own: f64| if size > 0.0 { 0.5 * own / size } else { 0.5 / count };
-            self.0.extend(way.into_iter().map(|(number, own)| (number, weight(own))));
+            self.rows.extend(way.into_iter().map(|(number, own)| (number, weight(own))));
         }
+    }
+
+    /// Counts the rows of two results of which these many were paired.
+    pub(super) fn count(&mut self, rows: usize, pairs: usize) {
+        self.unmatched[0] += rows - 2 * pairs;
+        self.unmatched[1] += rows;
     }
 
     /// The differences alone.
     #[cfg(test)]
     pub(super) fn numbers(&self) -> Vec<f64> {
-        self.0.iter().map(|(number, _)| *number).collect()
+        self.rows.iter().map(|(number, _)| *number).collect()
     }
 }
 
 impl Errors {
     /// The statistics of differences; `None` if there are none, or one is not finite.
-    pub(super) fn of(Differences(mut rows): Differences) -> Option<Self> {
+    pub(super) fn of(Differences { mut rows, .. }: Differences) -> Option<Self> {
         if rows.is_empty() || !rows.iter().all(|(x, _)| x.is_finite()) {
             return None;
         }
