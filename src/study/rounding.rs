@@ -13,7 +13,8 @@ impl Measure {
             Self::Points | Self::Surface => of_positions(geometry),
             Self::Attribute(name) if name == P.name => of_positions(geometry),
             Self::Attribute(name) => {
-                let columns = geometry.parts().flat_map(Component::columns).filter(|(_, known, _)| known[..] == name[..]);
+                let columns =
+                    geometry.parts().flat_map(Component::columns).filter(|(_, known, _)| known[..] == name[..]);
                 let largest = columns.map(|(.., column)| match column {
                     Column::F1(rows) => largest(rows),
                     Column::F3(rows) => largest(rows.as_flattened()),
