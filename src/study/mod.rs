@@ -41,7 +41,7 @@ use crate::{load, memory};
 use bench::Subject;
 use knobs::{Knob, KnobArg};
 use measure::Study;
-use norms::Norm;
+use norms::{Measure, Norm};
 use outcome::{Goal, Outcome};
 
 /// The arguments of `study`.
@@ -151,6 +151,9 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
     let output = output(&graph, args.output.as_deref())?;
     let name = graph.outputs[output].name.to_string();
     if args.knobs.is_empty() {
+        if args.tolerance.is_some() || args.budget.is_some() || args.json.is_some() {
+            crate::say!("note: nothing is measured without --knob; the graph's are:");
+        }
         let text = propose::text(&graph, output, &load::graph_name(&args.graph));
         std::io::stdout().write_all(text.as_bytes())?;
         return Ok(());
@@ -166,15 +169,20 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
             knobs[twice].key
         )));
     }
-    let needed = propose::upstream(&graph, graph.outputs[output].from.node);
+    // What is compared: the output, or what a node publishes.
+    let (compared, what) = match &norm.measure {
+        Measure::Metric { node, .. } => {
+            let place = graph.nodes.iter().position(|found| *found.id == **node);
+            (place.unwrap_or(graph.outputs[output].from.node), format!("`{}`", norm.measure.name()))
+        }
+        _ => (graph.outputs[output].from.node, format!("the output `{name}`")),
+    };
+    let needed = propose::upstream(&graph, compared);
     let is_idle = |knob: &&Knob| {
         graph.nodes.iter().position(|node| *node.id == *knob.node).is_some_and(|node| !needed.contains(&node))
     };
     if let Some(idle) = knobs.iter().find(is_idle) {
-        return Err(wrong(format!(
-            "the output `{name}` does not depend on `{}`, so `{}` cannot change it",
-            idle.node, idle.key
-        )));
+        return Err(wrong(format!("{what} does not depend on `{}`, so `{}` cannot change it", idle.node, idle.key)));
     }
     let paths = Paths::new(args, &name);
     paths.check(args, &graph)?;

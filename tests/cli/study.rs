@@ -312,6 +312,7 @@ fn wrong_names_are_refused_with_what_was_meant() {
     refused(2, &["--knob", "blades.cvs=2,4", "--output", "still"], "the output `still` does not depend on `blades`");
     refused(2, &["--knob", STEPS, "--output", "fur"], "the graph has no output `fur`");
     refused(2, &["--knob", STEPS, "--norm", "bent.nothing"], "has no metric `nothing`; it has `");
+    refused(2, &["--knob", STEPS, "--norm", "wind.max_angle"], "`wind.max_angle` does not depend on `bent`");
     refused(2, &["--knob", STEPS, "--norm", "heat"], "the output has no attribute `heat`");
     refused(2, &["--knob", STEPS, "--norm", "volum"], "no attribute `volum`; did you mean `volume`?");
     refused(
@@ -461,6 +462,9 @@ fn without_knobs_commands_for_those_of_the_graph_are_printed() {
     let text = bench.done(&["study", "g.json"]);
     let command = text.lines().find(|line| line.contains("bent.rotation_steps=")).unwrap();
     assert!(text.contains("# rotation_steps of Curve_Wind_Collision, order 1\n"), "{text}");
+    let asked = bench.run(&["study", "g.json", "--tolerance", "1e-3"]);
+    assert_eq!((asked.code, &asked.stdout), (Some(0), &text));
+    assert!(asked.stderr.contains("note: nothing is measured without --knob"), "{}", asked.stderr);
     let args: Vec<&str> = command.split(' ').skip(1).chain(["--frames", "1", "--repeats", "1", "--quiet"]).collect();
     assert!(bench.done(&args).contains("declared 1"));
 }
