@@ -9,7 +9,7 @@ use std::time::Duration;
 use engine::clock::Stopwatch;
 use engine::cook::{Delivered, Report, Stopped};
 use engine::geometry::Geometry;
-use engine::graph::{Fault, Graph, fault::code};
+use engine::graph::{Catalogue, Fault, Graph, fault::code};
 use engine::memory::Ceiling;
 use engine::plan::Request;
 use engine::time::Frame;
@@ -36,6 +36,7 @@ impl From<Failure> for Stop {
 
 /// Everything that the runs of a study share.
 pub(super) struct Subject<'a> {
+    pub(super) catalogue: Catalogue,
     pub(super) bytes: &'a [u8],
     pub(super) path: &'a Path,
     /// What `--set` overrides in all runs, and what the knobs need.
@@ -144,7 +145,7 @@ impl Subject<'_> {
     /// failure of the command.
     fn graph(&self, set: &[(String, String)]) -> Result<Cooked<Graph>, Failure> {
         let set: Vec<_> = self.fixed.iter().chain(set).cloned().collect();
-        let faults = match load::loaded(self.bytes, self.path, &settings(&set)) {
+        let faults = match load::loaded_with(self.catalogue, self.bytes, self.path, &settings(&set)) {
             Ok(graph) => return Ok(Cooked::Done(graph)),
             Err(faults) => faults,
         };

@@ -4,6 +4,8 @@
 //! with one reference, beyond the best of them; how far the best is from it is the floor, below which nothing is claimed.
 
 mod bench;
+#[cfg(test)]
+mod declared;
 mod direction;
 mod extremes;
 mod knobs;
@@ -205,6 +207,7 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
     let progress = Progress::new((planned * request.frames.len()) as u64, args.quiet);
     let frames = request.frames.iter().map(Frame::to_json).collect();
     let subject = Subject {
+        catalogue: crate::CATALOGUE,
         bytes: &bytes,
         path: &args.graph,
         fixed,
