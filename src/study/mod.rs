@@ -6,6 +6,7 @@
 mod bench;
 #[cfg(test)]
 mod declared;
+mod differences;
 mod direction;
 mod extremes;
 mod knobs;
