@@ -15,6 +15,8 @@ use engine::cook::{Engine, Settings};
 
 #[path = "../tests/accuracy_table/mod.rs"]
 mod accuracy_table;
+#[path = "../tests/stability/animated.rs"]
+mod animated;
 #[path = "../tests/graphs/bits.rs"]
 mod bits;
 #[path = "../tests/cooked/mod.rs"]
@@ -76,7 +78,8 @@ fn main() -> ExitCode {
     }
     if asked("stability") {
         page::run_in_full();
-        [every_node::GROUPS, wind::GROUPS, softbody::GROUPS, liquid::GROUPS].concat().iter().for_each(|table| table());
+        let tables = [every_node::GROUPS, animated::GROUPS, wind::GROUPS, softbody::GROUPS, liquid::GROUPS].concat();
+        tables.iter().for_each(|table| table());
         held &= stored("docs/stability.md", page::text(), bless);
     }
     if held { ExitCode::SUCCESS } else { ExitCode::FAILURE }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use engine::cook::{Engine, Settings};
 use engine::files::{RELATIVE_PATHS, is_handed_over, unreadable};
 use engine::graph::fault::code;
-use engine::graph::{Fault, FaultClass, Graph, Part, probe};
+use engine::graph::{Catalogue, Fault, FaultClass, Graph, Part, probe};
 use engine::memory::Ceiling;
 use engine::note::Note;
 use formats::Format;
@@ -71,10 +71,18 @@ pub fn graph_name(path: &Path) -> String {
 /// # Errors
 /// All faults of the graph.
 pub fn loaded(bytes: &[u8], path: &Path, set: &[Setting]) -> Result<Graph, Vec<Fault>> {
+    loaded_with(CATALOGUE, bytes, path, set)
+}
+
+/// The same with other node types.
+///
+/// # Errors
+/// All faults of the graph.
+pub fn loaded_with(catalogue: Catalogue, bytes: &[u8], path: &Path, set: &[Setting]) -> Result<Graph, Vec<Fault>> {
     let folder =
         path.parent().filter(|_| !is_handed_over(path) && !is_stdin(path)).map_or_else(PathBuf::new, Path::to_owned);
     let set: Vec<(String, String)> = set.iter().map(|Setting(key, json)| (key.clone(), json.clone())).collect();
-    let loaded = Graph::load_bytes(bytes, &folder, CATALOGUE, &set, &probe);
+    let loaded = Graph::load_bytes(bytes, &folder, catalogue, &set, &probe);
     loaded.map_err(|faults| as_read_from(path, naming_features(faults)))
 }
 

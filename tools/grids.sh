@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Cooks every setting of the grids on which the search of `convect study --tolerance` is tested, and stores errors and CPU times in
-# tests/study_grids/SCENE.json: dough_rolling, sauce_pour and bear_storm, frames 1-24, cells from 4h to h with the reference at h/1.4.
-# Names of scenes cook these alone. Takes CONVECT for the program, or the release build; half an hour on two cores. What the search makes of
-# them: cargo test --lib study::replay -- --nocapture
+# tests/study_grids/SCENE.json: dough_rolling, sauce_pour and bear_storm, frames 1-24, cells from 4h to h with the reference at h/1.4;
+# and four scenes that the search was not made on. Names of scenes cook these alone. Takes CONVECT for the program, or the release
+# build; half an hour on two cores. What the search makes of them: cargo test --lib study::replay -- --nocapture
 set -euo pipefail
 cd "$(dirname "$0")/.."
 convect=${CONVECT:-target/release/convect}
@@ -46,3 +46,8 @@ grid dough_rolling dough --norm surface --knob body.spacing=0.04,0.0283,0.02,0.0
 grid sauce_pour dish --norm surface --knob sauce.cell=0.036,0.02546,0.018,0.01273,0.009 --knob sauce.cfl=4,2,1,0.5 \
     --knob sauce.tolerance=1e-2,1e-3,1e-4
 grid bear_storm bear --set fur_out.coherence=0 --knob fur_out.rotation_steps=2,4,8,16,32,64 --knob swing.tolerance=1e-1,1e-2,1e-3,1e-4
+# Scenes that the search was not made on.
+grid curve_jiggle ball --norm surface --knob fur.cvs=3,5,9,17,33 --knob jiggle.tolerance=1e-1,1e-2,1e-3,1e-4
+grid curve_wind_collision scene --norm surface --knob bent.rotation_steps=2,4,8,16,32,64 --knob blades.cvs=3,5,9,17
+grid dam_break water --norm surface --knob water.cell=0.113,0.08,0.0566,0.04,0.0283 --knob water.cfl=4,2,1,0.5
+grid softbody_cage fall --norm surface --knob figure.spacing=0.08,0.0566,0.04,0.0283 --knob fall.substeps=1,2,4,8

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Runs the studies of docs/error_and_time.md: graphs/SCENE/study.json and docs/studies/SCENE.svg for each scene that has a param
-# that trades accuracy for time. Names of scenes run these alone. Takes CONVECT for the program, or the release build.
+# that trades accuracy for time. Names of scenes run these alone. Takes CONVECT for the program, or the release build; REPEATS for the
+# number of cooks of each setting, of which more help on a busy machine.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 convect=${CONVECT:-target/release/convect}
@@ -12,7 +13,7 @@ study() {
     shift
     [ "$chosen" = "  " ] || [[ $chosen == *" $scene "* ]] || return 0
     printf '\n== %s\n' "$scene"
-    "$convect" study "graphs/$scene/$scene.json" "$@" --fresh --quiet --out "$out/$scene" --json "graphs/$scene/study.json"
+    "$convect" study "graphs/$scene/$scene.json" "$@" ${REPEATS:+--repeats "$REPEATS"} --fresh --quiet --out "$out/$scene" --json "graphs/$scene/study.json"
     mkdir -p docs/studies
     cp "$out/$scene"/*.svg "docs/studies/$scene.svg"
 }

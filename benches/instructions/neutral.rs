@@ -38,6 +38,14 @@ const HELD: &str = r#"
     "end": { "type": "Point_In", "params": { "points": [[-0.5, 0, 0]] } },
     "pins": { "type": "Softbody_Pin", "inputs": { "targets": "end" }, "params": { "radius": 0.2 } },"#;
 
+/// The beam sways, and touches nothing.
+const LOOSE: &str = r#""node": { "type": "Softbody", "inputs": { "bodies": ["body"], "pins": ["pins"] },
+    "params": { "stiffness": 3e6, "damping": 1e-3, "self_collision": false } },"#;
+
+/// The block falls apart in a box.
+const POOL: &str = r#""node": { "type": "FluidSolve", "inputs": { "liquid": ["block"] }, "params": {
+    "cell": 0.05, "viscosity": 1, "domain_from": [-0.4, -0.4, -0.4], "domain_to": [0.4, 0.4, 0.4] } },"#;
+
 /// A case on the fur.
 const fn on_fur(name: &'static str, nodes: &'static [&'static str], output: &'static str) -> Case {
     Case { name, nodes, before: &["fur", "ball"], output, frames: 6 }
@@ -102,14 +110,7 @@ pub(crate) const NEUTRAL: &[Neutral] = &[
         missed: false,
     },
     Neutral {
-        without: on_beam(
-            "no goals",
-            &[
-                HELD,
-                r#""node": { "type": "Softbody", "inputs": { "bodies": ["body"], "pins": ["pins"] },
-                                        "params": { "stiffness": 3e6, "damping": 1e-3, "self_collision": false } },"#,
-            ],
-        ),
+        without: on_beam("no goals", &[HELD, LOOSE]),
         with: on_beam(
             "goals of strength 0",
             &[
@@ -142,15 +143,7 @@ pub(crate) const NEUTRAL: &[Neutral] = &[
         missed: false,
     },
     Neutral {
-        without: on_liquid(
-            "a box of 4,096 cells",
-            &[
-                DROP,
-                r#""node": { "type": "FluidSolve", "inputs": { "liquid": ["block"] }, "params": {
-                                  "cell": 0.05, "viscosity": 1,
-                                  "domain_from": [-0.4, -0.4, -0.4], "domain_to": [0.4, 0.4, 0.4] } },"#,
-            ],
-        ),
+        without: on_liquid("a box of 4,096 cells", &[DROP, POOL]),
         with: on_liquid(
             "a box of 40,960 cells, as much liquid",
             &[
@@ -168,6 +161,18 @@ pub(crate) const NEUTRAL: &[Neutral] = &[
             "nodes that no output needs",
             &[FUR, WIND, r#""unused": { "type": "Curve_Jiggle", "inputs": { "curves": "wind" } },"#],
             "wind",
+        ),
+        missed: false,
+    },
+    Neutral {
+        without: on_liquid("one output of a node", &[DROP, POOL]),
+        with: on_liquid(
+            "an output of a node that nothing needs",
+            &[
+                DROP,
+                POOL,
+                r#""other": { "type": "Fluid_Surface", "inputs": { "volume": "node.volume" }, "params": { "resolution": 2 } },"#,
+            ],
         ),
         missed: false,
     },

@@ -2,14 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 use engine::clock::Stopwatch;
 use engine::cook::{Delivered, Report, Stopped};
 use engine::geometry::Geometry;
-use engine::graph::{Fault, Graph, fault::code};
+use engine::graph::{Catalogue, Fault, Graph, fault::code};
 use engine::memory::Ceiling;
 use engine::plan::Request;
 use engine::time::Frame;
@@ -36,6 +36,7 @@ impl From<Failure> for Stop {
 
 /// Everything that the runs of a study share.
 pub(super) struct Subject<'a> {
+    pub(super) catalogue: Catalogue,
     pub(super) bytes: &'a [u8],
     pub(super) path: &'a Path,
     /// What `--set` overrides in all runs, and what the knobs need.
@@ -46,6 +47,8 @@ pub(super) struct Subject<'a> {
     pub(super) ceiling: Ceiling,
     pub(super) cancel: Arc<AtomicBool>,
     pub(super) progress: Progress,
+    /// What the first run leaves out that has points or curves without counterpart in the reference.
+    pub(super) unmatched: OnceLock<String>,
 }
 
 /// Time and memory of a run; times are milliseconds a frame.
@@ -110,13 +113,10 @@ pub(super) struct Reference {
 }
 
 impl Reference {
-    /// The largest coordinate: that which f32 stores least precisely.
-    pub(super) fn largest_coordinate(&self) -> f32 {
-        let of_frame = |geometry: &Arc<Geometry>| {
-            let numbers = geometry.parts().flat_map(|part| part.positions().as_flattened().iter().copied());
-            numbers.fold(0.0_f32, |largest, x| largest.max(x.abs()))
-        };
-        self.frames.values().map(of_frame).fold(0.0, f32::max)
+    /// What the storage of results as f32 may change of an error: four units in the last place of the largest number that is
+    /// compared. Of a volume, what moving the whole surface by that much would; nothing of a metric, which is not stored.
+    pub(super) fn rounding(&self, measure: &Measure) -> f64 {
+        self.frames.values().map(|geometry| measure.rounding(geometry)).fold(0.0, f64::max)
     }
 }
 
@@ -145,7 +145,7 @@ impl Subject<'_> {
     /// failure of the command.
     fn graph(&self, set: &[(String, String)]) -> Result<Cooked<Graph>, Failure> {
         let set: Vec<_> = self.fixed.iter().chain(set).cloned().collect();
-        let faults = match load::loaded(self.bytes, self.path, &settings(&set)) {
+        let faults = match load::loaded_with(self.catalogue, self.bytes, self.path, &settings(&set)) {
             Ok(graph) => return Ok(Cooked::Done(graph)),
             Err(faults) => faults,
         };
@@ -261,6 +261,16 @@ impl Subject<'_> {
             }
             let both = own.iter().filter_map(|(frame, value)| Some(value - reference.metric.get(frame)?));
             differences.extend(both.map(f64::abs));
+        }
+        let [unmatched, all] = differences.unmatched;
+        if unmatched > 0 {
+            let set: Vec<String> =
+                set_of(knobs, setting).into_iter().map(|(key, value)| format!("{key}={value}")).collect();
+            let _ = self.unmatched.set(format!(
+                "only what both results have is compared, matched by its id: with {} that is {:.3} % of what they have",
+                set.join(", "),
+                100.0 * (all - unmatched) as f64 / all as f64
+            ));
         }
         Ok(match Errors::of(differences) {
             Some(errors) => Run { setting: setting.to_vec(), result: Ok((cost, errors)) },

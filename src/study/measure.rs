@@ -8,7 +8,7 @@ use engine::graph::Graph;
 use super::bench::{Cooked, Cost, Reference, Run, Stop, Subject, set_of};
 use super::direction::{self, End};
 use super::knobs::Knob;
-use super::norms::{Errors, Measure, Statistic};
+use super::norms::{Errors, Statistic};
 use super::outcome::Goal;
 use super::search::{self, Point, Target};
 use super::store::{Store, Stored};
@@ -272,8 +272,9 @@ impl<'a> Study<'a> {
             match self.subject.reference(&set)? {
                 Cooked::Done(reference) => {
                     let is_exact = beyond.is_empty() && without.is_empty();
+                    let measure = &self.subject.norm.measure;
                     let mut why = match is_exact {
-                        true => format!("exact: {}; the floor is the rounding of stored positions", described(&exact)),
+                        true => format!("exact: {}; the floor is {}", described(&exact), measure.rounding_name()),
                         false => format!(
                             "one beyond the best setting: {}; the floor is the best setting's difference from it",
                             beyond
@@ -288,7 +289,7 @@ impl<'a> Study<'a> {
                         why += &format!(" (nothing is beyond the best of {})", without.join(", "));
                     }
                     self.stored.is_beyond = !is_exact;
-                    self.stored.rounding = rounding(&reference, &self.subject.norm.measure);
+                    self.stored.rounding = reference.rounding(measure);
                     let rounding = self.stored.rounding;
                     self.stored.floor = is_exact.then_some(Errors { mean: rounding, p99: rounding, max: rounding });
                     (self.stored.reference, self.stored.why, self.reference) = (set, why, Some(reference));
@@ -340,16 +341,5 @@ impl<'a> Study<'a> {
         self.store.save(&self.stored, true)?;
         self.stored.runs.sort_by(|a, b| a.setting.cmp(&b.setting));
         Ok(Found { knobs: self.knobs, stored: self.stored })
-    }
-}
-
-/// What the storage of positions may change of an error: four units in the last place of the largest coordinate; nothing of
-/// what is not a length.
-fn rounding(reference: &Reference, measure: &Measure) -> f64 {
-    let largest = reference.largest_coordinate();
-    let ulp = f64::from(largest.next_up()) - f64::from(largest);
-    match measure {
-        Measure::Points | Measure::Surface => 4.0 * ulp,
-        Measure::Volume | Measure::Attribute(_) | Measure::Metric { .. } => 0.0,
     }
 }

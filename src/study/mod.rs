@@ -4,6 +4,9 @@
 //! with one reference, beyond the best of them; how far the best is from it is the floor, below which nothing is claimed.
 
 mod bench;
+#[cfg(test)]
+mod declared;
+mod differences;
 mod direction;
 mod extremes;
 mod knobs;
@@ -16,6 +19,7 @@ mod plot;
 mod propose;
 #[cfg(test)]
 mod replay;
+mod rounding;
 mod search;
 mod store;
 mod table;
@@ -24,21 +28,23 @@ mod tune;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::OnceLock;
 
 use engine::graph::Graph;
 use engine::plan::Request;
 use engine::time::Frame;
+use formats::atomic::AtomicFile;
 
 use crate::args::{Frames, Setting, Size};
 use crate::failure::{Exit, Failure, cancelled_by_signal};
-use crate::output::{create_folder, write_whole};
+use crate::output::{create_folder, failed, fill, write_whole};
 use crate::progress::Progress;
 use crate::targets::Targets;
 use crate::{load, memory};
 use bench::Subject;
 use knobs::{Knob, KnobArg};
 use measure::Study;
-use norms::Norm;
+use norms::{Measure, Norm};
 use outcome::{Goal, Outcome};
 
 /// The arguments of `study`.
@@ -108,7 +114,9 @@ pub struct StudyArgs {
 
 fn positive(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|number| number.is_finite() && *number > 0.0);
-    number.ok_or_else(|| format!("`{text}` is not a tolerance, expected a number greater than 0"))
+    number.ok_or_else(|| {
+        format!("`{text}` is not a tolerance, expected a number greater than 0 in the unit of the norm, as in 0.001 for 1 mm")
+    })
 }
 
 /// `20ms`, `1.5s` of `--budget`, in milliseconds.
@@ -146,6 +154,9 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
     let output = output(&graph, args.output.as_deref())?;
     let name = graph.outputs[output].name.to_string();
     if args.knobs.is_empty() {
+        if args.tolerance.is_some() || args.budget.is_some() || args.json.is_some() {
+            crate::say!("note: nothing is measured without --knob; the graph's are:");
+        }
         let text = propose::text(&graph, output, &load::graph_name(&args.graph));
         std::io::stdout().write_all(text.as_bytes())?;
         return Ok(());
@@ -161,15 +172,20 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
             knobs[twice].key
         )));
     }
-    let needed = propose::upstream(&graph, graph.outputs[output].from.node);
+    // What is compared: the output, or what a node publishes.
+    let (compared, what) = match &norm.measure {
+        Measure::Metric { node, .. } => {
+            let place = graph.nodes.iter().position(|found| *found.id == **node);
+            (place.unwrap_or(graph.outputs[output].from.node), format!("`{}`", norm.measure.name()))
+        }
+        _ => (graph.outputs[output].from.node, format!("the output `{name}`")),
+    };
+    let needed = propose::upstream(&graph, compared);
     let is_idle = |knob: &&Knob| {
         graph.nodes.iter().position(|node| *node.id == *knob.node).is_some_and(|node| !needed.contains(&node))
     };
     if let Some(idle) = knobs.iter().find(is_idle) {
-        return Err(wrong(format!(
-            "the output `{name}` does not depend on `{}`, so `{}` cannot change it",
-            idle.node, idle.key
-        )));
+        return Err(wrong(format!("{what} does not depend on `{}`, so `{}` cannot change it", idle.node, idle.key)));
     }
     let paths = Paths::new(args, &name);
     paths.check(args, &graph)?;
@@ -192,6 +208,7 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
     let progress = Progress::new((planned * request.frames.len()) as u64, args.quiet);
     let frames = request.frames.iter().map(Frame::to_json).collect();
     let subject = Subject {
+        catalogue: crate::CATALOGUE,
         bytes: &bytes,
         path: &args.graph,
         fixed,
@@ -201,18 +218,29 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
         ceiling: memory::ceiling(args.memory),
         cancel,
         progress,
+        unmatched: OnceLock::new(),
     };
     subject.check(&knobs)?;
     create_folder(&args.out)?;
+    // Before the runs, so that an invalid path is reported at once.
+    let json_path = args.json.as_ref().filter(|path| !is_stdout(path));
+    let json_file = json_path.map(AtomicFile::create).transpose().map_err(|error| failed(&error))?;
     let mut study = Study::new(&subject, knobs, goal, &graph, &paths.store, args.repeats);
     if !args.fresh && study.resume() && !args.quiet {
-        crate::say!("{} runs are taken from `{}`; --fresh measures them anew", study.runs(), paths.store.display());
+        let runs = match study.runs() {
+            1 => "1 run is".to_owned(),
+            runs => format!("{runs} runs are"),
+        };
+        crate::say!("{runs} taken from `{}`; --fresh measures anew", paths.store.display());
     }
     let interrupted = study.measure()?;
     let found = study.finish()?;
     // Ends the bar, before anything else is printed.
-    let Subject { progress, fixed, .. } = subject;
+    let Subject { progress, fixed, unmatched, .. } = subject;
     drop(progress);
+    if let Some(text) = unmatched.get().filter(|_| !args.quiet) {
+        crate::say!("note: {text}");
+    }
     let reversed = found.knobs.iter().zip(&found.stored.reversed).filter(|(_, reversed)| **reversed && !args.quiet);
     for (knob, _) in reversed {
         let key = &knob.key;
@@ -238,7 +266,7 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
         goal,
     };
     outcome.judge();
-    write(args, &paths, &outcome, &bytes, &graph, &fixed)?;
+    write(args, &paths, &outcome, json_file, Source { bytes: &bytes, graph: &graph, fixed: &fixed })?;
     if outcome.pick.is_none() {
         earlier_tuned(args, &paths.tuned, outcome.goal, interrupted)?;
     }
@@ -304,18 +332,25 @@ fn is_stdout(path: &Path) -> bool {
     path == Path::new("-")
 }
 
-/// Writes plot, tuned graph, JSON and table.
+/// What a tuned graph is made from: the graph's text, the graph, and what all runs set.
+struct Source<'a> {
+    bytes: &'a [u8],
+    graph: &'a Graph,
+    fixed: &'a [(String, String)],
+}
+
+/// Writes plot, tuned graph, JSON and table. `json_file` is that of `--json`, unless it is stdout.
 fn write(
     args: &StudyArgs,
     paths: &Paths,
     outcome: &Outcome,
-    bytes: &[u8],
-    graph: &Graph,
-    fixed: &[(String, String)],
+    json_file: Option<AtomicFile>,
+    source: Source<'_>,
 ) -> Result<(), Failure> {
     write_whole(&paths.plot, plot::svg(outcome).as_bytes())?;
     let mut wrote = vec![&paths.plot];
     if let Some(pick) = outcome.pick {
+        let Source { bytes, graph, fixed } = source;
         let tuned = tune::tuned(outcome, pick, bytes, graph, fixed, &args.out);
         let tuned = tuned.map_err(|why| Failure::new(Exit::Graph, why))?;
         write_whole(&paths.tuned, tuned.as_bytes())?;
@@ -324,11 +359,12 @@ fn write(
     let table = table::text(outcome);
     if let Some(path) = &args.json {
         let text = format!("{:#}\n", outcome.to_json());
-        if is_stdout(path) {
-            std::io::stdout().write_all(text.as_bytes())?;
-        } else {
-            write_whole(path, text.as_bytes())?;
-            wrote.push(path);
+        match json_file {
+            None => std::io::stdout().write_all(text.as_bytes())?,
+            Some(file) => {
+                fill(file, text.as_bytes())?;
+                wrote.push(path);
+            }
         }
     }
     match args.json.as_ref().is_some_and(|path| is_stdout(path)) {
@@ -381,11 +417,13 @@ fn verdict(outcome: &Outcome) -> Result<(), Failure> {
             "the tolerance {}{unit} is below the floor of the {statistic}, {}{unit}: such an error cannot be claimed; {}",
             brief(tolerance),
             brief(outcome.floor()),
-            if outcome.is_beyond {
-                "give the knobs finer values"
-            } else {
-                "the reference is exact, and the floor is the rounding of stored positions, which no value lowers: ask for more \
-                 than it, or move the scene closer to its origin"
+            match outcome.is_beyond {
+                true => "give the knobs finer values".to_owned(),
+                false => format!(
+                    "the reference is exact, and the floor is {}, which no value lowers: ask for more than it, or move the scene \
+                     closer to its origin",
+                    outcome.norm.measure.rounding_name()
+                ),
             }
         )),
         Goal::Tolerance(tolerance) => failed(format!(

@@ -2,7 +2,8 @@
 //! the other way.
 
 use engine::geometry::{Component, Topology};
-use numerics::tree::TriangleTree;
+use numerics::lanes::LANES;
+use numerics::tree::{Boxes, Region, TriangleTree};
 use numerics::vector::{DVec3, to_f64};
 
 use super::norms::{Differences, element_pairs};
@@ -16,7 +17,9 @@ pub(super) fn both_ways(a: &Component, b: &Component, into: &mut Differences) ->
     match (a.topology(), b.topology()) {
         (Topology::Curves(of_a), Topology::Curves(of_b)) => {
             let mut ways = [Vec::new(), Vec::new()];
-            for (i, j) in element_pairs(a, b)? {
+            let pairs = element_pairs(a, b)?;
+            into.count(a.element_count() + b.element_count(), pairs.len());
+            for (i, j) in pairs {
                 let (p, q) = (&a.positions()[of_a.range(i)], &b.positions()[of_b.range(j)]);
                 let way = |from: &[[f32; 3]], to: &[[f32; 3]]| -> Vec<(f64, f64)> {
                     let distances = from.iter().map(|point| to_polyline(to_f64(*point), to));
@@ -68,12 +71,8 @@ impl<'a> Surface<'a> {
         used.dedup();
         let from: Vec<[f32; 3]> = used.iter().map(|point| self.positions[*point as usize]).collect();
         let found = other.tree.closest_each(&from, f32::INFINITY);
-        // The tree finds the triangle in f32; its distance is taken in f64.
         let each = from.iter().zip(found).map(|(point, found)| match found {
-            Some(found) => {
-                let corners = other.triangles[found.triangle as usize];
-                to_triangle(to_f64(*point), corners.map(|corner| to_f64(other.positions[corner as usize])))
-            }
+            Some(found) => other.distance(*point, found.triangle),
             None => f64::NAN,
         });
         let mut areas = vec![0.0; self.positions.len()];
@@ -84,6 +83,70 @@ impl<'a> Surface<'a> {
         }
         each.zip(used.iter().map(|point| areas[*point as usize])).collect()
     }
+}
+
+impl Surface<'_> {
+    /// The distance of a point in f64, from the triangle that is nearest in f32. Of triangles that are equally near in f32
+    /// another may be nearer: what differs by little is far from its error otherwise.
+    fn distance(&self, point: [f32; 3], triangle: u32) -> f64 {
+        let to = |triangle: u32| {
+            let corners = self.triangles[triangle as usize];
+            to_triangle(to_f64(point), corners.map(|corner| to_f64(self.positions[corner as usize])))
+        };
+        let mut least = to(triangle);
+        let mut walk = self.tree.walk(Ball::new(point, least));
+        while let Some((block, mut lanes)) = walk.next() {
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize;
+                lanes &= lanes - 1;
+                let distance = to(self.tree.blocks()[block].triangle[lane]);
+                if distance < least {
+                    least = distance;
+                    *walk.region() = Ball::new(point, least);
+                }
+            }
+        }
+        least
+    }
+}
+
+/// All that may be as near to a point as `square` is far.
+struct Ball {
+    centre: [f32; 3],
+    square: f32,
+}
+
+impl Ball {
+    fn new(centre: [f32; 3], radius: f64) -> Self {
+        // Above the rounding of squares.
+        Self { centre, square: (radius * radius * (1.0 + 1e-5)) as f32 }
+    }
+}
+
+impl Region for Ball {
+    fn meeting(&self, boxes: &Boxes) -> u16 {
+        let meets = |lane: &usize| {
+            let outside = |axis: usize| {
+                let x = self.centre[axis];
+                (boxes.low[axis].0[*lane] - x).max(x - boxes.high[axis].0[*lane]).max(0.0)
+            };
+            (0..3).map(|axis| outside(axis) * outside(axis)).sum::<f32>() <= self.square
+        };
+        (0..LANES).filter(meets).fold(0, |mask, lane| mask | 1 << lane)
+    }
+}
+
+/// The area of a mesh, or of the faces that only one tet has.
+pub(super) fn area(part: &Component) -> f64 {
+    let triangles = match part.topology() {
+        Topology::Tets(tets) => boundary(tets),
+        _ => part.triangles().corners.clone(),
+    };
+    let area = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|corner| to_f64(part.positions()[corner as usize]));
+        (b - a).cross(&(c - a)).norm() / 2.0
+    };
+    triangles.iter().map(area).sum()
 }
 
 /// The faces that only one tet has.
@@ -158,6 +221,33 @@ mod tests {
         assert_eq!(found.len(), 12);
         assert!(found[..6].iter().all(|x| (x - 1.0 / 3.0_f64.sqrt()).abs() < 1e-12), "{found:?}");
         assert!(found[6..].iter().all(|x| *x == 1.0), "{found:?}");
+    }
+
+    #[test]
+    fn surfaces_that_almost_touch_are_compared_in_f64() {
+        // Two wavy sheets, 1e-7 apart at coordinates of 1: the triangle that is nearest in f32 is often another.
+        const SIDE: u32 = 12;
+        let sheet = |lift: f32| {
+            let at = |k: u32| {
+                let [x, z] = [(k % SIDE) as f32 / 11.0, (k / SIDE) as f32 / 11.0];
+                [x, 1.0 + 0.05 * libm::sinf(9.0 * x) * libm::cosf(7.0 * z) + lift * libm::sinf(40.0 * (x + z)), z]
+            };
+            let quad = |k: u32| [k, k + SIDE, k + 1, k + 1, k + SIDE, k + SIDE + 1];
+            let quads = (0..SIDE * (SIDE - 1)).filter(|k| k % SIDE < SIDE - 1);
+            let corners: Vec<u32> = quads.flat_map(quad).collect();
+            Component::mesh(vec![3; corners.len() / 3], corners, (0..SIDE * SIDE).map(at).collect()).unwrap()
+        };
+        let (a, b) = (sheet(0.0), sheet(2e-7));
+        let mut found = Differences::default();
+        both_ways(&a, &b, &mut found).unwrap();
+        let way = |from: &Component, to: &Component| -> Vec<f64> {
+            let shape = |corners: &[u32; 3]| corners.map(|corner| to_f64(to.positions()[corner as usize]));
+            let shapes: Vec<[DVec3; 3]> = to.triangles().corners.iter().map(shape).collect();
+            let least =
+                |point: &[f32; 3]| shapes.iter().map(|shape| to_triangle(to_f64(*point), *shape)).fold(1.0, f64::min);
+            from.positions().iter().map(least).collect()
+        };
+        assert_eq!(found.numbers(), [way(&a, &b), way(&b, &a)].concat());
     }
 
     #[test]

@@ -9,6 +9,7 @@ use engine::geometry::{CURVE_ID, Column, Component, Geometry, ID, Kind, Owner, P
 use engine::graph::Graph;
 use numerics::vector::to_f64;
 
+pub(super) use super::differences::{Differences, Errors};
 use super::nearest;
 use crate::stats::surface::{SurfaceStats, tet_volume};
 
@@ -197,7 +198,9 @@ fn each_part(
 fn points(a: &Component, b: &Component, into: &mut Differences) -> Result<(), String> {
     let (p, q) = (a.positions(), b.positions());
     let distance = |(i, j): (usize, usize)| (to_f64(p[i]) - to_f64(q[j])).norm();
-    into.extend(point_pairs(a, b)?.into_iter().map(distance));
+    let pairs = point_pairs(a, b)?;
+    into.count(p.len() + q.len(), pairs.len());
+    into.extend(pairs.into_iter().map(distance));
     Ok(())
 }
 
@@ -276,6 +279,7 @@ fn attribute(name: &str, a: &Geometry, b: &Geometry, into: &mut Differences) -> 
                 return Err(format!("the attribute `{name}` has another type in each of two results"));
             }
             let (p, q, width) = (rows(p), rows(q), p.kind().width());
+            into.count((p.len() + q.len()) / width, pairs.len());
             let row = |rows: &'_ [f64], row: usize| -> Vec<f64> { rows[row * width..(row + 1) * width].to_vec() };
             into.extend(
                 pairs.into_iter().map(|(i, j)| {
@@ -323,78 +327,6 @@ fn enclosed(geometry: &Geometry) -> Result<f64, String> {
     let tets = geometry.tets().ok_or("the output has no closed mesh and no tets, so it encloses no volume")?;
     let positions = tets.positions();
     Ok(tets.tet_corners().iter().map(|tet| tet_volume(tet.map(|corner| positions[corner as usize]))).sum())
-}
-
-/// Statistics of differences.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Errors {
-    pub(super) mean: f64,
-    pub(super) p99: f64,
-    pub(super) max: f64,
-}
-
-/// Differences of two results with their weights.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Differences(Vec<(f64, f64)>);
-
-impl Extend<f64> for Differences {
-    /// Adds differences that count the same.
-    fn extend<I: IntoIterator<Item = f64>>(&mut self, numbers: I) {
-        self.0.extend(numbers.into_iter().map(|number| (number, 1.0)));
-    }
-}
-
-impl Differences {
-    /// Adds those of both ways between two shapes, each with the length or area that its point stands for. Both ways together
-    /// weigh 1, each half of that: how finely a shape is cut must not change how much a part of it counts.
-    pub(super) fn extend_both_ways(&mut self, ways: [Vec<(f64, f64)>; 2]) {
-        for way in ways {
-            let size: f64 = way.iter().map(|(_, size)| size).sum();
-            let count = way.len() as f64;
-            let weight = |own: f64| if size > 0.0 { 0.5 * own / size } else { 0.5 / count };
-            self.0.extend(way.into_iter().map(|(number, own)| (number, weight(own))));
-        }
-    }
-
-    /// The differences alone.
-    #[cfg(test)]
-    pub(super) fn numbers(&self) -> Vec<f64> {
-        self.0.iter().map(|(number, _)| *number).collect()
-    }
-}
-
-impl Errors {
-    /// The statistics of differences; `None` if there are none, or one is not finite.
-    pub(super) fn of(Differences(mut rows): Differences) -> Option<Self> {
-        if rows.is_empty() || !rows.iter().all(|(x, _)| x.is_finite()) {
-            return None;
-        }
-        let total: f64 = rows.iter().map(|(_, weight)| weight).sum();
-        let mean = rows.iter().map(|(x, weight)| x * weight).sum::<f64>() / total;
-        rows.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // The smallest number that 99 of 100 do not exceed, up to the rounding of the sum.
-        let most = 0.99 * total * (1.0 - 1e-12);
-        let mut sum = 0.0;
-        let rank = rows.iter().position(|(_, weight)| {
-            sum += weight;
-            sum >= most
-        });
-        let max = rows[rows.len() - 1].0;
-        Some(Self { mean, p99: rank.map_or(max, |rank| rows[rank].0), max })
-    }
-
-    pub(super) fn get(&self, statistic: Statistic) -> f64 {
-        match statistic {
-            Statistic::Mean => self.mean,
-            Statistic::P99 => self.p99,
-            Statistic::Max => self.max,
-        }
-    }
-
-    /// As JSON.
-    pub(super) fn to_json(self) -> serde_json::Value {
-        serde_json::json!({"mean": self.mean, "p99": self.p99, "max": self.max})
-    }
 }
 
 #[cfg(test)]

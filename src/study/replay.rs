@@ -28,16 +28,24 @@ struct Replayed {
     pick: usize,
 }
 
-/// A grid's name, and the largest share of its time that a search may take: with each setting cooked once, without the
-/// reference; and as the commands cook them.
-const GRIDS: [(&str, [f64; 2]); 3] = [
+/// A grid's name; the largest share of its time that a search may take, with each setting cooked once, without the reference,
+/// and as the commands cook them; and how many times as long as the cheapest setting within the tolerance the pick may take.
+/// The search was made on the first three; no number in it is from the others.
+const GRIDS: [(&str, [f64; 3]); 7] = [
     // The reference alone takes 27 % of what the full grid takes.
-    ("dough_rolling", [0.29, 0.37]),
-    ("sauce_pour", [0.29, 0.25]),
-    ("bear_storm", [0.25, 0.25]),
+    ("dough_rolling", [0.25, 0.36, 1.2]),
+    ("sauce_pour", [0.25, 0.21, 1.2]),
+    ("bear_storm", [0.25, 0.19, 1.2]),
+    ("curve_wind_collision", [0.25, 0.25, 1.4]),
+    // All settings take about the same time, so that a quarter of it is that of four or five.
+    ("curve_jiggle", [0.3, 0.3, 1.6]),
+    // The best setting alone takes 29 %, and the splash is chaotic.
+    ("dam_break", [0.55, 0.65, 1.5]),
+    // 16 settings, of which the finest is the only one within the two lowest tolerances.
+    ("softbody_cage", [0.45, 0.45, 1.5]),
 ];
 
-/// The pick takes at most this many times as long as the cheapest setting of the grid within the tolerance.
+/// The same of the first three with noisy times, at noise 0.
 const MOST_EXPENSIVE: f64 = 1.3;
 
 impl Grid {
@@ -152,7 +160,7 @@ fn undisturbed(_: &[usize], ms: f64) -> f64 {
 
 #[test]
 fn a_search_finds_what_the_full_grid_has_for_a_part_of_its_time() {
-    println!("grid           tolerance  settings  share once  as cooked  time ÷ cheapest  error ÷ tolerance");
+    println!("grid                 tolerance  settings  share once  as cooked  time ÷ cheapest  error ÷ tolerance");
     for (grid, most) in GRIDS.map(|(name, most)| (Grid::read(name), most)) {
         let tolerances = grid.tolerances(12);
         let mut worst = [0.0_f64; 3];
@@ -163,7 +171,7 @@ fn a_search_finds_what_the_full_grid_has_for_a_part_of_its_time() {
             let ratio = pick.cost().unwrap().cpu_ms / grid.cheapest(*tolerance);
             let [once, as_cooked] = grid.shares(&replayed, *tolerance);
             println!(
-                "{:<14} {tolerance:9.2e}  {:2} of {:2}  {:8.0} %  {:7.0} %  {ratio:15.2}  {error:17.2}",
+                "{:<20} {tolerance:9.2e}  {:2} of {:2}  {:8.0} %  {:7.0} %  {ratio:15.2}  {error:17.2}",
                 grid.name,
                 replayed.cooked.len(),
                 grid.runs.len(),
@@ -173,7 +181,8 @@ fn a_search_finds_what_the_full_grid_has_for_a_part_of_its_time() {
             assert!(error <= 1.0, "{}: {error}", grid.name);
             worst = [worst[0].max(once), worst[1].max(as_cooked), worst[2].max(ratio)];
         }
-        assert!(worst[0] <= most[0] && worst[1] <= most[1] && worst[2] <= MOST_EXPENSIVE, "{}: {worst:.2?}", grid.name);
+        println!("{}: at most {worst:.2?}", grid.name);
+        assert!(worst.iter().zip(most).all(|(found, most)| *found <= most), "{}: {worst:.2?}", grid.name);
     }
 }
 
@@ -188,7 +197,7 @@ fn noise(seed: u64) -> f64 {
 fn with_noisy_times_the_pick_meets_the_tolerance_and_is_as_cheap() {
     const RERUNS: u64 = 8;
     for noisy in [0.05, 0.2] {
-        for grid in GRIDS.map(|(name, _)| Grid::read(name)) {
+        for (place, grid) in GRIDS.map(|(name, _)| Grid::read(name)).into_iter().enumerate() {
             let (mut same, mut all, mut worst) = (0, 0, 0.0_f64);
             for tolerance in grid.tolerances(12) {
                 let usual = grid.search(tolerance, &undisturbed);
@@ -211,9 +220,10 @@ fn with_noisy_times_the_pick_meets_the_tolerance_and_is_as_cheap() {
                 grid.name,
                 100.0 * noisy
             );
-            // sauce_pour has settings that take the same time to a hundredth: another pick is one of these.
+            // sauce_pour has settings that take the same time to a hundredth: another pick is one of these. The grids after the
+            // first three are printed for what they are: they were not made for the search, nor it for them.
             assert!(
-                same * 10 >= all * 7 && worst <= MOST_EXPENSIVE * (1.0 + noisy / 2.0),
+                same * 10 >= all * 7 && (place > 2 || worst <= MOST_EXPENSIVE * (1.0 + noisy / 2.0)),
                 "{}: {same} {worst}",
                 grid.name
             );

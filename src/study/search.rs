@@ -2,7 +2,7 @@
 
 use super::bench::Stop;
 use super::knobs::Knob;
-use super::model::{Axis, Law, Model};
+use super::model::{Axis, Expected, Law, Model};
 use super::outcome::Goal;
 
 /// A grid with more settings is searched instead.
@@ -64,10 +64,21 @@ const LEAST_OF_PRICE: f64 = 0.05;
 /// Which share of its price is taken from the gain of a cook, to choose between several.
 const PRICE: f64 = 3.0;
 
+/// The share of what the whole grid would take beyond which a cook must be expected to save as large a share as the search has
+/// then taken.
+const MOST_OF_GRID: f64 = 0.25;
+
+/// The same where the best setting, which has to be cooked, takes about as much by itself: this many times what it takes.
+const MORE_THAN_BEST: f64 = 1.25;
+
+/// How many deviations below its expectation the time of what was not cooked is taken for that share: three times in four it is
+/// not less.
+const DOUBT: f64 = 0.674;
+
 /// Searches a grid for the cheapest setting within a tolerance, or the most accurate within a budget. The best setting is
 /// cooked for the floor, the coarsest because it may do, and then one after the other the setting of which most is expected:
-/// the chance that it meets the goal times what it would save. The search ends where no setting is worth a cook. Without a
-/// goal it goes along each knob with the others at their best.
+/// the chance that it meets the goal times what it would save. The search ends where no setting is worth a cook; once a quarter of
+/// what the whole grid would take is spent, few are. Without a goal it goes along each knob with the others at their best.
 pub(super) fn search(knobs: &[Knob], target: &dyn Fn() -> Target, measure: Measured<'_>) -> Result<(), Stop> {
     let best = best(knobs);
     let mut cooked = vec![(best.clone(), measure(&best)?)];
@@ -147,11 +158,19 @@ fn most_promising(
     };
     let spent: f64 = done.iter().map(|(_, point)| point.ms).sum();
     let untried = grid.iter().filter(|setting| cooked.iter().all(|(known, _)| known != *setting));
-    let worth = |setting: &Vec<usize>| {
-        let (gain, price) = (gain(setting), times.expected(setting).number() / spent);
-        (gain >= LEAST_GAIN.max(LEAST_OF_PRICE * price)).then_some(gain - PRICE * price)
+    let untried: Vec<(&Vec<usize>, Expected)> = untried.map(|setting| (setting, times.expected(setting))).collect();
+    let at_least = |time: &Expected| libm::exp(time.log - DOUBT * time.deviation);
+    let whole: f64 = spent + untried.iter().map(|(_, time)| at_least(time)).sum::<f64>();
+    // The best was cooked first.
+    let of_best = cooked.first().and_then(|(_, point)| *point).map_or(0.0, |point| point.ms);
+    let usual = (MOST_OF_GRID * whole).max(MORE_THAN_BEST * of_best);
+    let worth = |setting: &[usize], time: &Expected| {
+        let (gain, price) = (gain(setting), time.number() / spent);
+        let share = (spent + time.number()) / usual;
+        let least = if share > 1.0 { MOST_OF_GRID * share } else { LEAST_GAIN.max(LEAST_OF_PRICE * price) };
+        (gain >= least).then_some(gain - PRICE * price)
     };
-    let worthy = untried.filter_map(|setting| Some((worth(setting)?, setting)));
+    let worthy = untried.iter().filter_map(|(setting, time)| Some((worth(setting, time)?, *setting)));
     worthy.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, setting)| setting.clone())
 }
 

@@ -22,6 +22,7 @@ mod stats;
 mod stopped;
 mod stored_studies;
 mod study;
+mod study_check;
 mod study_extremes;
 mod targets;
 mod usd;

@@ -10,7 +10,7 @@ use std::process::Stdio;
 
 /// Upright hairs of one segment that the wind turns into a wall: each stops at its first contact, so what steps get wrong is
 /// a part of one step.
-const WALL: &str = r#"// A wall in the wind.
+pub(crate) const WALL: &str = r#"// A wall in the wind.
 {
   "convect": 1,
   "scene": { "frames": [1, 2] },
@@ -45,7 +45,7 @@ const SWING: &str = r#"{
 }"#;
 
 /// A soft block that sways gently from a pinned side: smooth motion, without contact.
-const SWAY: &str = r#"{
+pub(crate) const SWAY: &str = r#"{
   "convect": 1,
   "scene": { "frames": [1, 12] },
   "nodes": {
@@ -59,7 +59,7 @@ const SWAY: &str = r#"{
   "outputs": { "soft": "soft" }
 }"#;
 
-const STEPS: &str = "bent.rotation_steps=4,8,16,32";
+pub(crate) const STEPS: &str = "bent.rotation_steps=4,8,16,32";
 
 fn study(bench: &Bench, more: &[&str]) -> Value {
     let args = ["study", "g.json", "--json", "-", "--quiet", "--repeats", "1", "--fresh"];
@@ -145,7 +145,7 @@ fn a_method_of_lower_order_than_declared_is_caught() {
 }
 
 /// A block of thick liquid that slumps.
-const SLUMP: &str = r#"{
+pub(crate) const SLUMP: &str = r#"{
   "convect": 1,
   "scene": { "frames": [1, 3], "fps": 6 },
   "nodes": {
@@ -312,6 +312,7 @@ fn wrong_names_are_refused_with_what_was_meant() {
     refused(2, &["--knob", "blades.cvs=2,4", "--output", "still"], "the output `still` does not depend on `blades`");
     refused(2, &["--knob", STEPS, "--output", "fur"], "the graph has no output `fur`");
     refused(2, &["--knob", STEPS, "--norm", "bent.nothing"], "has no metric `nothing`; it has `");
+    refused(2, &["--knob", STEPS, "--norm", "wind.max_angle"], "`wind.max_angle` does not depend on `bent`");
     refused(2, &["--knob", STEPS, "--norm", "heat"], "the output has no attribute `heat`");
     refused(2, &["--knob", STEPS, "--norm", "volum"], "no attribute `volum`; did you mean `volume`?");
     refused(
@@ -334,8 +335,28 @@ fn norms_of_surfaces_attributes_and_metrics_have_their_units() {
     );
     let metric = study(&bench, &["--knob", STEPS, "--norm", "bent.length_error"]);
     assert_eq!((&metric["norm"], &metric["unit"]), (&json!("bent.length_error"), &json!("")));
-    let attribute = study(&bench, &["--knob", STEPS, "--norm", "P"]);
-    assert_eq!(attribute["runs"][0]["error"], study(&bench, &["--knob", STEPS])["runs"][0]["error"]);
+    let (attribute, points) = (study(&bench, &["--knob", STEPS, "--norm", "P"]), study(&bench, &["--knob", STEPS]));
+    assert_eq!((&attribute["runs"][0]["error"], &attribute["floor"]), (&points["runs"][0]["error"], &points["floor"]));
+}
+
+#[test]
+fn hairs_that_only_one_of_two_results_has_are_noted() {
+    let bench = Bench::with_graph(WALL);
+    let ran = bench.run(&["study", "g.json", "--knob", "blades.density=500,1000", "--repeats", "1"]);
+    // The reference has a density of 2000: all of 1000 hairs, and half of 2000.
+    let note = "note: only what both results have is compared, matched by its id: with blades.density=1000 that is ";
+    let share = ran.stderr.split_once(note).unwrap_or_else(|| panic!("{}", ran.stderr)).1.split(' ').next().unwrap();
+    assert!((share.parse::<f64>().unwrap() - 200.0 / 3.0).abs() < 3.0, "{share}");
+    let ran = bench.run(&["study", "g.json", "--knob", STEPS, "--repeats", "1"]);
+    assert!(!ran.stderr.contains("only what both"), "{}", ran.stderr);
+}
+
+#[test]
+fn a_path_for_the_json_that_cannot_be_written_is_reported_before_the_runs() {
+    let bench = Bench::with_graph(WALL);
+    let ran = bench.run(&["study", "g.json", "--knob", STEPS, "--json", "missing/runs.json"]);
+    assert!(ran.code == Some(1) && ran.stderr.contains("`missing/runs.json` could not be created"), "{}", ran.stderr);
+    assert_eq!(bench.names("out"), [""; 0], "nothing was cooked");
 }
 
 #[test]
@@ -441,6 +462,9 @@ fn without_knobs_commands_for_those_of_the_graph_are_printed() {
     let text = bench.done(&["study", "g.json"]);
     let command = text.lines().find(|line| line.contains("bent.rotation_steps=")).unwrap();
     assert!(text.contains("# rotation_steps of Curve_Wind_Collision, order 1\n"), "{text}");
+    let asked = bench.run(&["study", "g.json", "--tolerance", "1e-3"]);
+    assert_eq!((asked.code, &asked.stdout), (Some(0), &text));
+    assert!(asked.stderr.contains("note: nothing is measured without --knob"), "{}", asked.stderr);
     let args: Vec<&str> = command.split(' ').skip(1).chain(["--frames", "1", "--repeats", "1", "--quiet"]).collect();
     assert!(bench.done(&args).contains("declared 1"));
 }

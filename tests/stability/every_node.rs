@@ -8,7 +8,7 @@ use std::sync::Arc;
 use conformance::{RangeEnd, cook_all, range_ends};
 use engine::cook::{Engine, Settings};
 use engine::error::ErrorKind;
-use engine::geometry::{Component, Geometry, Kind, P, UVW};
+use engine::geometry::{Component, Geometry, Kind, P, Topology, UVW};
 use engine::graph::{Body, Graph, GraphOutput, Link, probe};
 use engine::node::{Arity, Cook, Node};
 use engine::param::{ParamSpec, Value};
@@ -126,8 +126,19 @@ pub(crate) fn needed(node: &str) -> &'static str {
     }
 }
 
-/// The graph of a node with these params beside those that it needs.
-fn graph(node: &Node, extra: &str) -> Result<Graph, String> {
+/// What a node that reads one kind of geometry from a file reads.
+fn read_from_file(node: &Node) -> Option<Kind> {
+    Some(match node.name {
+        "Curve_In" => Kind::Curves,
+        "Mesh_In" => Kind::Mesh,
+        "Point_In" => Kind::Points,
+        "Tet_In" => Kind::Tets,
+        _ => return None,
+    })
+}
+
+/// The graph of a node with these params beside those that it needs; a file, or another value of the first, takes their place.
+pub(crate) fn graph(node: &Node, extra: &str) -> Result<Graph, String> {
     // Goals have scenes of their own; of a liquid inside its collider or sink nothing is left.
     let is_left_out = |input: &str| match node.name {
         "FluidSolve" => ["colliders", "sinks", "sources"].contains(&input),
@@ -142,7 +153,11 @@ fn graph(node: &Node, extra: &str) -> Result<Graph, String> {
             format!(r#""{name}": "{from}""#)
         }
     });
-    let params: Vec<&str> = [needed(node.name), extra].into_iter().filter(|params| !params.is_empty()).collect();
+    let needed = needed(node.name);
+    let key = needed.split(':').next().unwrap_or_default();
+    let is_replaced = extra.contains(r#""file""#) || (!key.is_empty() && extra.contains(key));
+    let needed = if is_replaced { "" } else { needed };
+    let params: Vec<&str> = [needed, extra].into_iter().filter(|params| !params.is_empty()).collect();
     let text = format!(
         r#"{{ "convect": 1, "scene": {{ "frames": [1, 24], "seed": 7 }}, "outputs": {{ "out": "n" }},
               "nodes": {{ {SOURCES} "n": {{ "type": "{}", "inputs": {{ {} }}, "params": {{ {} }} }} }} }}"#,
@@ -164,7 +179,14 @@ fn graph(node: &Node, extra: &str) -> Result<Graph, String> {
 }
 
 /// The params of a node that reads a file, and the folder where that is: the inputs of the others, as a row changes them.
-fn files(node: &Node, change: Change) -> (Option<tempfile::TempDir>, String) {
+pub(crate) fn files(node: &Node, change: Change) -> (Option<tempfile::TempDir>, String) {
+    if let Some(kind) = read_from_file(node) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("inputs.json");
+        let (.., part) = inputs().into_iter().find(|(_, of, _)| *of == kind).unwrap();
+        std::fs::write(&path, text_of(&changed(part, kind, change))).unwrap();
+        return (Some(folder), format!(r#""file": {:?}"#, path.display().to_string()));
+    }
     if node.name != "Usd_In" {
         return (None, String::new());
     }
@@ -176,6 +198,20 @@ fn files(node: &Node, change: Change) -> (Option<tempfile::TempDir>, String) {
     writer.frame(1.0, &geometry).unwrap();
     writer.finish().unwrap();
     (Some(folder), format!(r#""file": {:?}"#, path.display().to_string()))
+}
+
+/// A component as convect's json, whose writer would refuse what is not finite.
+fn text_of(part: &Component) -> String {
+    let (points, kind) = (part.positions(), part.kind());
+    let more = match part.topology() {
+        Topology::Curves(runs) => format!(r#""counts": {:?}, "#, runs.counts().collect::<Vec<_>>()),
+        Topology::Mesh(faces) => {
+            format!(r#""counts": {:?}, "indices": {:?}, "#, faces.runs.counts().collect::<Vec<_>>(), faces.corners)
+        }
+        Topology::Points => String::new(),
+        Topology::Tets(tets) => format!(r#""indices": {tets:?}, "#),
+    };
+    format!(r#"{{ "{kind}": {{ {more}"points": {points:?} }} }}"#)
 }
 
 /// A component as a row changes it.
@@ -239,7 +275,7 @@ pub(crate) struct Cooked {
     notes: Vec<String>,
 }
 
-fn cook(graph: Graph, node: &Node, change: Change, threads: usize) -> Cooked {
+pub(crate) fn cook(graph: Graph, node: &Node, change: Change, threads: usize) -> Cooked {
     let last = match node.cook {
         Cook::Pure(_) => 1,
         Cook::Solver(..) => page::frames(3),
@@ -318,7 +354,9 @@ fn rows() {
         for (number, what, kind, change) in ROWS {
             let is_rate = matches!(change, Change::Rate(_));
             let (folder, params) = files(node, change);
-            if !(reads(node, kind) || is_rate || folder.is_some()) {
+            let of_file =
+                folder.is_some() && kind.is_none_or(|kind| read_from_file(node).is_none_or(|own| own == kind));
+            if !(reads(node, kind) || is_rate || of_file) {
                 continue;
             }
             let Ok(graph) = graph(node, &params) else { continue };

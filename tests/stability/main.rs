@@ -5,6 +5,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test's helpers")]
 
+mod animated;
 #[path = "../cooked/mod.rs"]
 mod cooked;
 mod every_node;
