@@ -117,7 +117,7 @@ pub enum CollisionError {
 pub struct CollisionScene<'a> {
     /// Skins of the bodies.
     pub skins: &'a [BodySkin],
-    /// Factor on the friction of each particle; 1 without.
+    /// Factor on the friction of each contact point; 1 without.
     pub friction: Option<&'a [f32]>,
     /// The ground; it takes precedence over obstacles.
     pub ground: Option<Ground>,
@@ -175,7 +175,7 @@ impl CollisionScene<'_> {
                 let depth = (ground.thickness - before).max(0.0);
                 let (allowed, speed) = rising.map_or((0.0, 0.0), |overlap| self.allowed(overlap, depth, query.times));
                 out.push(Contact {
-                    particles: [*particle, 0, 0, 0],
+                    points: [*particle, 0, 0, 0],
                     weights: [1.0, 0.0, 0.0, 0.0],
                     normal: ground.up,
                     offset: ground.height - allowed,
@@ -189,12 +189,12 @@ impl CollisionScene<'_> {
     }
 
     /// Factor on friction at the point with these weights.
-    fn friction_scale(&self, particles: &[u32], weights: &[f64]) -> f64 {
+    fn friction_scale(&self, points: &[u32], weights: &[f64]) -> f64 {
         let Some(mask) = self.friction else { return 1.0 };
-        let of = |particle: &u32| mask.get(*particle as usize).map_or(1.0, |scale| f64::from(*scale));
+        let of = |point: &u32| mask.get(*point as usize).map_or(1.0, |scale| f64::from(*scale));
         let (mut sum, mut whole) = (0.0, 0.0);
-        for (particle, weight) in particles.iter().zip(weights).filter(|side| *side.1 != 0.0) {
-            sum += of(particle) * weight.abs();
+        for (point, weight) in points.iter().zip(weights).filter(|side| *side.1 != 0.0) {
+            sum += of(point) * weight.abs();
             whole += weight.abs();
         }
         if whole > 0.0 { sum / whole } else { 1.0 }
@@ -391,10 +391,10 @@ impl SkinObstaclePair<'_> {
         collect_in_order(&indices, &find_in, out);
     }
 
-    /// A contact of particles with points of the obstacle, which counts as stopped above the ground.
+    /// A contact of points of the body with points of the obstacle, which counts as stopped above the ground.
     fn contact(
         &self,
-        (particles, weights): ([u32; 4], [f64; 4]),
+        (own, weights): ([u32; 4], [f64; 4]),
         (points, shares): (&[u32], &[f64]),
         normal: DVec3,
         shift: f64,
@@ -407,13 +407,13 @@ impl SkinObstaclePair<'_> {
         let seconds = self.obstacle.seconds * (times[1] - times[0]);
         let stopping = if seconds > 0.0 { (raised_end - raised) / seconds } else { DVec3::zeros() };
         Contact {
-            particles,
+            points: own,
             weights,
             normal: normal.into(),
             offset: normal.dot(&(end + raised_end)) - shift,
             gap,
             velocity: (self.obstacle.velocity_of(times[1], points, shares) + stopping).into(),
-            friction: self.obstacle.friction * self.scene.friction_scale(&particles, &weights),
+            friction: self.obstacle.friction * self.scene.friction_scale(&own, &weights),
             jammed: -normal.dot(&raised_end) > JAMMED * gap,
         }
     }

@@ -246,7 +246,7 @@ impl CollisionScene<'_> {
                 let [u, v, w] = outer.weights(inner, &exit, normal);
                 let (allowed, speed) = self.allowed(overlap, exit.distance + params.thickness, query.times);
                 out.push(Contact {
-                    particles: [exit.point, a, b, c],
+                    points: [exit.point, a, b, c],
                     weights: [1.0, -u, -v, -w],
                     normal: normal.into(),
                     offset: -allowed,
@@ -263,13 +263,13 @@ impl CollisionScene<'_> {
         let first = &self.skins[overlap.skin];
         let normal = DVec3::from(overlap.direction);
         let [start, end] = query.times.map(|time| other.at(time));
-        let mut push = |exit: &Exit, (particles, weights): ([u32; 4], [f64; 4]), (points, shares): (&[u32], &[f64])| {
+        let mut push = |exit: &Exit, (own, weights): ([u32; 4], [f64; 4]), (points, shares): (&[u32], &[f64])| {
             let (allowed, speed) = self.allowed(overlap, exit.distance + other.thickness, query.times);
             let reached: DVec3 =
                 points.iter().zip(shares).map(|(point, share)| DVec3::from(end[*point as usize]) * *share).sum();
             let velocity = other.velocity_of(query.times[1], points, shares) + normal * speed;
             out.push(Contact {
-                particles,
+                points: own,
                 weights,
                 normal: normal.into(),
                 offset: normal.dot(&reached) - allowed,
@@ -294,25 +294,16 @@ impl CollisionScene<'_> {
         }
     }
 
-    /// Where particles at `x`, and more points of each skin, are at the end of the frame.
-    pub fn penetration(&self, x: &[[f64; 3]], more: &[Vec<[f64; 3]>]) -> Penetration {
+    /// Where contact points at `x` are at the end of the frame.
+    pub fn penetration(&self, x: &[[f64; 3]]) -> Penetration {
         let scene = CollisionScene { separation: None, ..*self };
         let mut contacts = Vec::new();
         scene.find(&ContactQuery { from: x, to: x, times: [1.0; 2] }, &mut contacts);
         let depths = contacts.iter().map(|contact| contact.depth(x));
         let mut found = Penetration { inside: 0, deepest: depths.fold(0.0, f64::max) };
-        // The points of each skin: its particles, then more.
-        let (mut points, mut is_particle, mut ranges) = (Vec::new(), Vec::new(), Vec::new());
-        for (index, skin) in self.skins.iter().enumerate() {
-            let first = points.len();
-            points.extend(skin.touching.iter().map(|particle| x[*particle as usize]));
-            is_particle.resize(points.len(), true);
-            points.extend(more.get(index).into_iter().flatten());
-            is_particle.resize(points.len(), false);
-            ranges.push((first..points.len(), bounds(points[first..].iter().copied())));
-        }
         if let Some(ground) = self.ground {
-            let heights = points.iter().map(|p| DVec3::from(*p).dot(&DVec3::from(ground.up)) - ground.height);
+            let points = self.skins.iter().flat_map(|skin| &skin.touching).map(|point| x[*point as usize]);
+            let heights = points.map(|p| DVec3::from(p).dot(&DVec3::from(ground.up)) - ground.height);
             found.deepest = heights.fold(found.deepest, |deepest, height| deepest.max(ground.thickness - height));
         }
         let ends: Vec<_> = self.obstacles.iter().map(|obstacle| obstacle.at(1.0)).collect();
@@ -324,15 +315,15 @@ impl CollisionScene<'_> {
         let skins = self.skins.iter().enumerate().filter_map(|(index, skin)| {
             Some((Some(index), SolidShape { surface: &skin.surface, at: x, gap: self.body_contact?.thickness }))
         });
-        let mut inside = vec![false; points.len()];
-        for (own, solid) in obstacles.chain(skins) {
+        let mut inside = vec![false; x.len()];
+        let boxes: Vec<_> = self.skins.iter().map(|skin| skin_bounds(skin, x)).collect();
+        for (own, solid) in obstacles.chain(skins).filter(|(_, solid)| solid.surface.closed) {
             let around = bounds(solid.surface.vertices.iter().map(|vertex| solid.at[*vertex as usize]));
-            let others = ranges.iter().enumerate().filter(|(skin, _)| Some(*skin) != own);
-            let near = others.filter(|(_, (_, own))| overlap(own, &around)).flat_map(|(_, (range, _))| range.clone());
-            // What contacts do not measure, and what may be inside.
-            let near = near.filter(|point| !is_particle[*point] || overlap(&[points[*point]; 2], &around));
-            let near: Vec<u32> = near.map(|point| point as u32).collect();
-            solid.depths(&points, &near, &is_particle, &mut inside, &mut found.deepest);
+            let others =
+                (0..).zip(self.skins).filter(|(skin, _)| Some(*skin) != own && overlap(&boxes[*skin], &around));
+            let near = others.flat_map(|(_, skin)| &skin.touching).copied();
+            let near: Vec<u32> = near.filter(|point| overlap(&[x[*point as usize]; 2], &around)).collect();
+            solid.depths(x, &near, &mut inside, &mut found.deepest);
         }
         found.inside = inside.iter().filter(|inside| **inside).count();
         found
@@ -348,26 +339,25 @@ struct SolidShape<'a> {
 
 impl SolidShape<'_> {
     /// Marks those of the `near` points that are `inside`, and raises `deepest` to the largest depth of one below the gap.
-    /// Particles outside are left to contacts, which know how near they are.
-    fn depths(&self, points: &[[f64; 3]], near: &[u32], is_particle: &[bool], inside: &mut [bool], deepest: &mut f64) {
-        let mut within = vec![false; points.len()];
-        if self.surface.closed && !near.is_empty() {
-            Enclosure::new(self.at, &self.surface.triangles, 0.0).mark(points, near, &mut within);
+    /// Points outside are left to contacts, which know how near they are.
+    fn depths(&self, points: &[[f64; 3]], near: &[u32], inside: &mut [bool], deepest: &mut f64) {
+        if near.is_empty() {
+            return;
         }
-        let measured = |point: &&u32| within[**point as usize] || !is_particle[**point as usize];
-        let measured: Vec<u32> = near.iter().filter(measured).copied().collect();
-        if measured.is_empty() {
+        let mut within = vec![false; points.len()];
+        Enclosure::new(self.at, &self.surface.triangles, 0.0).mark(points, near, &mut within);
+        let within: Vec<u32> = near.iter().filter(|point| within[**point as usize]).copied().collect();
+        if within.is_empty() {
             return;
         }
         let narrow = |p: &[f64; 3]| to_f32(DVec3::from(*p));
         let corners: Vec<_> = self.at.iter().map(narrow).collect();
         let tree = TriangleTree::build(&corners, &self.surface.triangles);
-        let from: Vec<_> = measured.iter().map(|point| narrow(&points[*point as usize])).collect();
-        for (point, closest) in measured.iter().zip(tree.closest_each(&from, f32::INFINITY)) {
+        let from: Vec<_> = within.iter().map(|point| narrow(&points[*point as usize])).collect();
+        for (point, closest) in within.iter().zip(tree.closest_each(&from, f32::INFINITY)) {
             let Some(distance) = closest.map(|closest| f64::from(closest.distance)) else { continue };
-            let is_within = within[*point as usize];
-            inside[*point as usize] |= is_within && distance > TOUCHING * self.gap;
-            *deepest = deepest.max(self.gap + if is_within { distance } else { -distance });
+            inside[*point as usize] |= distance > TOUCHING * self.gap;
+            *deepest = deepest.max(self.gap + distance);
         }
     }
 }

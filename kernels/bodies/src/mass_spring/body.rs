@@ -14,6 +14,7 @@ use super::particle_order::Order;
 use super::partition::Partition;
 use super::regions::Regions;
 use super::tet_springs::{EDGES, edges, neighbours_of_missing};
+use crate::embedding::{EmbeddedPoint, with_riding};
 use numerics::masked::Masked;
 use numerics::vector::DVec3;
 
@@ -49,6 +50,8 @@ pub struct Mesh<'a> {
     /// Surface edges that no tetrahedron has. They become springs with the mean E·ΣV of the surface edges at their
     /// ends.
     pub missing: &'a [[u32; 2]],
+    /// Points that ride along on particles, by which bodies may meet things: contact points count on from the particles.
+    pub riding: &'a [EmbeddedPoint],
 }
 
 /// Material parameters.
@@ -81,10 +84,10 @@ pub enum BodyError {
     /// A coordinate is NaN or infinite.
     #[error("point {0} is not finite")]
     Point(usize),
-    /// A tetrahedron or spring has a particle index out of range, or the same one twice.
+    /// A tetrahedron, spring or riding point has a particle index out of range, or one of the first two a particle twice.
     #[error("{what} {index} joins particles {particles:?}; expected distinct indices below {count}")]
     Particles {
-        /// `tetrahedron` or `spring`.
+        /// `tetrahedron`, `spring` or `riding point`.
         what: &'static str,
         /// Index of that element.
         index: usize,
@@ -140,6 +143,8 @@ pub struct SoftBody {
     mesh_spring_count: usize,
     /// For each missing edge, the surface edges whose mean stiffness it takes.
     means: Vec<Vec<u32>>,
+    /// Points that ride along, by the caller's indices.
+    pub(super) riding: Vec<EmbeddedPoint>,
     /// Longest side of the bounding box at rest, metres.
     pub(super) size: f64,
     /// Mean rest length of the springs, metres.
@@ -261,6 +266,22 @@ impl SoftBody {
         clusters.range(piece.start).start..clusters.range(piece.end - 1).end
     }
 
+    /// Number of contact points: particles and points that ride along.
+    pub(super) fn contact_point_count(&self) -> usize {
+        self.len() + self.riding.len()
+    }
+
+    /// The index of each of the caller's contact points: the solver's of particles, the same of those that ride along.
+    pub(super) fn contact_indices(&self) -> impl Iterator<Item = usize> {
+        self.order.index_of.iter().map(|particle| *particle as usize).chain(self.len()..self.contact_point_count())
+    }
+
+    /// The caller's contact points with particles at `x`.
+    pub(super) fn contact_points(&self, x: &[DVec3]) -> Vec<[f64; 3]> {
+        let particles = self.order.index_of.iter().map(|particle| x[*particle as usize].into()).collect();
+        with_riding(particles, &self.riding)
+    }
+
     /// Permutes per-particle values from the caller's to the solver's order.
     pub(super) fn to_solver_order<T: Copy>(&self, values: &[T]) -> Vec<T> {
         self.order.caller_of.iter().map(|caller| values[*caller as usize]).collect()
@@ -323,6 +344,17 @@ impl SoftBody {
         }
         mesh.tets.iter().enumerate().try_for_each(|(index, tet)| distinct("tetrahedron", index, tet, count))?;
         mesh.missing.iter().enumerate().try_for_each(|(index, ends)| distinct("spring", index, ends, count))?;
+        for (index, carrier) in mesh.riding.iter().enumerate() {
+            if carrier.particles.iter().any(|particle| *particle as usize >= count) {
+                return Err(BodyError::Particles {
+                    what: "riding point",
+                    index,
+                    particles: carrier.particles.to_vec(),
+                    count,
+                });
+            }
+            carrier.weights.iter().try_for_each(|weight| number("weight", index, weight.abs()).map(|_| ()))?;
+        }
         for (index, spring) in joints.iter().enumerate() {
             distinct("spring", index, &spring.ends, count)?;
             stiffness(index, spring.stiffness)?;
@@ -380,6 +412,7 @@ impl SoftBody {
             given,
             kept,
             means,
+            riding: mesh.riding.to_vec(),
             mesh_spring_count,
             spacing,
         })

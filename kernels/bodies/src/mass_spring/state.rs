@@ -26,7 +26,7 @@ pub struct State {
     pub torn: Vec<bool>,
     /// Acceleration in the last step, m/s², for the predictor; empty at the start.
     pub(super) acceleration: Vec<[f64; 3]>,
-    /// The last normal force of contacts on each particle, newtons; empty at the start.
+    /// The last normal force of contacts on each contact point, newtons; empty at the start.
     pub(super) loads: Vec<f64>,
     /// Number of steps still to be taken with implicit Euler.
     pub(super) euler_steps_left: u32,
