@@ -163,6 +163,13 @@ impl BodySkin {
         all
     }
 
+    /// These particles, ascending, as the released ones.
+    pub(super) fn releasing_particles(&self, released: &[u32]) -> ReleasedElements {
+        let mut particles = vec![false; self.len()];
+        released.iter().for_each(|particle| particles[*particle as usize] = true);
+        ReleasedElements { particles, ..ReleasedElements::default() }
+    }
+
     /// Number of edges released by obstacles with particles at `x`: those more than eight times as long as at rest
     /// and as the skin's mean edge.
     pub fn released_edges(&self, x: &[[f64; 3]]) -> usize {

@@ -135,23 +135,28 @@ pub struct CollisionScene<'a> {
 
 impl ContactFinder for CollisionScene<'_> {
     /// The order is: ground contacts by particle; those of what is being pushed apart; those of each obstacle by
-    /// particle, then by its own points, then by edges; then pairs of bodies; then self-contacts.
+    /// particle, then by its own points, then by edges; then pairs of bodies; then self-contacts. An obstacle that a body is
+    /// pushed out of keeps out the particles that are not in it, so that it can go on pressing.
     fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
         self.on_ground(query, out);
-        self.separate(query, out);
+        let pushed = self.separate(query, out);
         let boxes = swept::swept_boxes(&[query.from, query.to]);
         if !self.obstacles.is_empty() {
             for (index, skin) in self.skins.iter().enumerate() {
                 let faces = skin.faces.sweep(&boxes, 0.0);
                 let released = skin.released(query.from);
-                let meeting = |other: &usize| self.separating(index, OverlapPartner::Obstacle(*other)).is_none();
-                for obstacle in (0..self.obstacles.len()).filter(meeting) {
-                    let caught = self.caught_by(obstacle);
-                    let released = &skin.releasing(&released, caught);
-                    self.against_obstacle(query, (skin, released), &boxes, obstacle, &mut |meeting, tree| {
+                for obstacle in 0..self.obstacles.len() {
+                    let pushed = pushed.iter().find(|pushed| (pushed.skin, pushed.obstacle) == (index, obstacle));
+                    let released = match pushed {
+                        Some(pushed) => skin.releasing_particles(&pushed.particles),
+                        None => skin.releasing(&released, self.caught_by(obstacle)),
+                    };
+                    self.against_obstacle(query, (skin, &released), &boxes, obstacle, &mut |meeting, tree| {
                         meeting.particles(tree, out);
-                        meeting.points(&faces, out);
-                        meeting.edges(out);
+                        if pushed.is_none() {
+                            meeting.points(&faces, out);
+                            meeting.edges(out);
+                        }
                     });
                 }
             }

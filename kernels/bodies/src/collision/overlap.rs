@@ -24,6 +24,8 @@ const TOUCHING: f64 = 0.01;
 /// Distance in gaps below their surface at which its points are tested for overlap. In a corner of a box, which is tested
 /// along its diagonal, that is still deeper than a gap below each face.
 const BELOW: f64 = 2.0;
+/// Share of its height above the ground by which a body is squeezed against the ground, if that is the shortest way out.
+const SQUEEZED: f64 = 0.25;
 
 /// What a body overlaps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,6 +62,13 @@ pub struct Separation<'a> {
     pub over: u32,
     /// Length of the frame, seconds.
     pub seconds: f64,
+}
+
+/// The particles of a skin that are being pushed out of an obstacle.
+pub(super) struct Pushed {
+    pub(super) skin: usize,
+    pub(super) obstacle: usize,
+    pub(super) particles: Vec<u32>,
 }
 
 /// Where bodies are, relative to what should keep them out.
@@ -103,13 +112,18 @@ impl<'a> Side<'a> {
         inside
     }
 
-    /// Where those of its points that are inside the other leave it in a direction.
+    /// Where those of its points that are inside the other, or a little below the surface are, leave it in a direction.
     fn exits(&self, other: &Self, candidates: &[u32], direction: DVec3) -> Vec<Exit> {
         let mut exits = other.solid.exits(&self.below, candidates, direction);
         for exit in &mut exits {
             let [below, point] = [&self.below, self.points].map(|all| DVec3::from(all[exit.point as usize]));
             exit.distance = (exit.distance + direction.dot(&(below - point))).max(0.0);
         }
+        // Those that are inside by less than that.
+        let is_known = |point: &u32| exits.binary_search_by_key(point, |exit| exit.point).is_ok();
+        let others: Vec<u32> = candidates.iter().copied().filter(|point| !is_known(point)).collect();
+        exits.extend(other.solid.exits(self.points, &others, direction));
+        exits.sort_by_key(|exit| exit.point);
         exits
     }
 
@@ -173,7 +187,7 @@ impl CollisionScene<'_> {
                     let gaps = [obstacle.thickness; 2];
                     let side = Side::new(x, &own.touching, &own.surface, gaps);
                     let other = Side::new(points, &obstacle.surface.vertices, &obstacle.surface, gaps);
-                    let ways = Ways { up: self.ground.map(|ground| ground.up.into()), gap: obstacle.thickness };
+                    let ways = Ways { ground: self.room(own, x), gap: obstacle.thickness };
                     let [marked, _] = ways.add(skin, OverlapPartner::Obstacle(index), [&side, &other], &mut found);
                     mark(&marked);
                 }
@@ -181,13 +195,21 @@ impl CollisionScene<'_> {
             for (index, next) in self.skins.iter().enumerate().skip(skin + 1) {
                 if self.body_contact.is_some() && overlap(&boxes[skin], &boxes[index]) {
                     let [side, other] = [own, next].map(|of| Side::new(x, &of.touching, &of.surface, [thickness; 2]));
-                    let ways = Ways { up: None, gap: thickness };
+                    let ways = Ways { ground: None, gap: thickness };
                     let marked = ways.add(skin, OverlapPartner::Skin(index), [&side, &other], &mut found);
                     marked.iter().for_each(|marked| mark(marked));
                 }
             }
         }
         (found, inside.iter().filter(|inside| **inside).count())
+    }
+
+    /// The upward direction of the ground, and how far a skin may be pushed down towards it.
+    fn room(&self, skin: &BodySkin, x: &[[f64; 3]]) -> Option<(DVec3, f64)> {
+        let ground = self.ground?;
+        let up = DVec3::from(ground.up);
+        let heights = skin.touching.iter().map(|point| up.dot(&DVec3::from(x[*point as usize])) - ground.height);
+        Some((up, SQUEEZED * heights.fold(0.0, f64::max)))
     }
 
     fn below_ground(&self, skin: usize, x: &[[f64; 3]], found: &mut Vec<Overlap>, mark: &mut impl FnMut(&[bool])) {
@@ -223,16 +245,21 @@ impl CollisionScene<'_> {
         (allowed, if seconds > 0.0 { (depth - allowed) / seconds } else { 0.0 })
     }
 
-    /// Contacts of the pairs that are being pushed apart.
-    pub(super) fn separate(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
+    /// Contacts of the pairs that are being pushed apart; returns what is pushed out of obstacles.
+    pub(super) fn separate(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) -> Vec<Pushed> {
+        let mut pushed = Vec::new();
         let overlaps = self.separation.map_or(&[][..], |separation| separation.overlaps);
         for overlap in overlaps.iter().filter(|overlap| self.separating(overlap.skin, overlap.partner).is_some()) {
             match overlap.partner {
                 OverlapPartner::Ground => {}
-                OverlapPartner::Obstacle(index) => self.out_of_obstacle(query, overlap, &self.obstacles[index], out),
+                OverlapPartner::Obstacle(obstacle) => {
+                    let particles = self.out_of_obstacle(query, overlap, &self.obstacles[obstacle], out);
+                    pushed.push(Pushed { skin: overlap.skin, obstacle, particles });
+                }
                 OverlapPartner::Skin(index) => self.out_of_skin(query, overlap, &self.skins[index], out),
             }
         }
+        pushed
     }
 
     fn out_of_skin(&self, query: &ContactQuery<'_>, overlap: &Overlap, other: &BodySkin, out: &mut Vec<Contact>) {
@@ -259,7 +286,14 @@ impl CollisionScene<'_> {
         }
     }
 
-    fn out_of_obstacle(&self, query: &ContactQuery<'_>, overlap: &Overlap, other: &Obstacle, out: &mut Vec<Contact>) {
+    /// Returns the particles that are pushed.
+    fn out_of_obstacle(
+        &self,
+        query: &ContactQuery<'_>,
+        overlap: &Overlap,
+        other: &Obstacle,
+        out: &mut Vec<Contact>,
+    ) -> Vec<u32> {
         let first = &self.skins[overlap.skin];
         let normal = DVec3::from(overlap.direction);
         let [start, end] = query.times.map(|time| other.at(time));
@@ -282,16 +316,18 @@ impl CollisionScene<'_> {
         let gaps = [other.thickness, 0.0];
         let body = Side::new(query.from, &first.touching, &first.surface, gaps);
         let solid = Side::new(&start, &other.surface.vertices, &other.surface, gaps);
-        for exit in body.exits(&solid, body.candidates, normal) {
-            let shares = solid.weights(&body, &exit, normal);
+        let exits = body.exits(&solid, body.candidates, normal);
+        for exit in &exits {
+            let shares = solid.weights(&body, exit, normal);
             let corners = other.surface.triangles[exit.face as usize];
-            push(&exit, ([exit.point, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]), (&corners, &shares));
+            push(exit, ([exit.point, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]), (&corners, &shares));
         }
         for exit in solid.exits(&body, solid.candidates, -normal) {
             let [a, b, c] = first.surface.triangles[exit.face as usize];
             let [u, v, w] = body.weights(&solid, &exit, -normal);
             push(&exit, ([a, b, c, 0], [u, v, w, 0.0]), (&[exit.point], &[1.0]));
         }
+        exits.iter().map(|exit| exit.point).collect()
     }
 
     /// Where contact points at `x` are at the end of the frame.
@@ -364,8 +400,8 @@ impl SolidShape<'_> {
 
 /// The ways in which a body may leave what it overlaps.
 struct Ways {
-    /// The upward direction of the ground, below which it is not pushed.
-    up: Option<DVec3>,
+    /// The upward direction of the ground, and how far it may be pushed down.
+    ground: Option<(DVec3, f64)>,
     gap: f64,
 }
 
@@ -392,14 +428,16 @@ impl Ways {
             DVec3::new(axis(k), axis(k / 3), axis(k / 9))
         });
         let directions = std::iter::once(shrinks).chain(lattice).filter_map(|direction| direction.try_normalize(0.0));
-        let allowed = directions.filter(|direction| self.up.is_none_or(|up| direction.dot(&up) > -1e-9));
+        let is_allowed = |direction: DVec3, depth: f64| {
+            self.ground.is_none_or(|(up, room)| direction.dot(&up) > -1e-9 || -direction.dot(&up) * depth <= room)
+        };
         let (mut depth, mut shortest) = (f64::INFINITY, None);
-        for direction in allowed {
+        for direction in directions {
             let (out, past) = (side.exits(other, &own, direction), other.exits(side, &others, -direction));
             let points = out.iter().chain(&past).map(|exit| exit.distance).fold(0.0, f64::max);
-            if points < depth {
+            if points < depth && is_allowed(direction, points + self.gap) {
                 let lines = side.way_out(other, direction, self.gap).max(other.way_out(side, -direction, self.gap));
-                if points.max(lines) < depth {
+                if points.max(lines) < depth && is_allowed(direction, points.max(lines) + self.gap) {
                     (depth, shortest) = (points.max(lines), Some(direction));
                 }
             }
