@@ -12,7 +12,7 @@ use super::joints::{Couple, couple};
 use super::pins::{BoundPins, bind_pins};
 use super::{BODIES, COUPLING_RADIUS, COUPLING_STIFFNESS, DAMPING, DENSITY, PINS, STIFFNESS};
 use crate::shared::attributes::{BODY_NUMBER, FILL, SLIVER, SURFACE_POINT};
-use crate::shared::pieces::pieces;
+use numerics::pieces::pieces;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 

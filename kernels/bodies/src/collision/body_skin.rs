@@ -1,12 +1,12 @@
 //! The skin of a body: its surface triangles, and which of their elements are too close at rest to count as contacts.
 
-use super::closest_point::{ClosestPoint, along};
 use super::obstacle::{check_points, check_triangles, narrow};
 use super::surface::{Edge, Moment, NONE, TriangleSurface};
-use super::swept::Elements;
 use super::{CaughtParticle, CollisionError};
 use crate::embedding::{EmbeddedPoint, with_riding};
 use crate::tets::SolidAngles;
+use numerics::closest_point::{ClosestPoint, along};
+use numerics::swept::SweptElements;
 use numerics::vector::DVec3;
 use std::collections::VecDeque;
 
@@ -20,8 +20,8 @@ const INSIDE: f64 = 0.5;
 #[derive(Clone, Debug)]
 pub struct BodySkin {
     pub(super) surface: TriangleSurface,
-    pub(super) faces: Elements<3>,
-    pub(super) edges: Elements<2>,
+    pub(super) faces: SweptElements<3>,
+    pub(super) edges: SweptElements<2>,
     rest: Vec<[f64; 3]>,
     /// Mean rest length of the edges, metres.
     mean: f64,
@@ -83,8 +83,8 @@ impl BodySkin {
             let (starts, rings) = rings(&surface, &neighbours, rest.len(), particles);
             Self {
                 particles,
-                faces: Elements::new(surface.triangles.clone(), rest),
-                edges: Elements::new(surface.edges.iter().map(|edge| edge.ends).collect(), rest),
+                faces: SweptElements::new(surface.triangles.clone(), rest),
+                edges: SweptElements::new(surface.edges.iter().map(|edge| edge.ends).collect(), rest),
                 rest: rest.to_vec(),
                 mean: surface.edges.iter().map(|edge| edge_length(edge, rest)).sum::<f64>()
                     / surface.edges.len().max(1) as f64,
@@ -190,7 +190,7 @@ impl BodySkin {
     }
 }
 
-/// Elements of a skin that obstacles have released, because they are overstretched. A collider that snags the skin
+/// SweptElements of a skin that obstacles have released, because they are overstretched. A collider that snags the skin
 /// would stretch it without limit, since contacts keep it on the side it came from.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ReleasedElements {

@@ -15,24 +15,23 @@
 
 mod body_skin;
 mod caught;
-mod closest_point;
-mod coplanarity;
 mod edge;
 mod motion;
 mod obstacle;
 mod overlap;
 mod pair;
 mod surface;
-mod swept;
 mod vertex;
 
 use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
 pub use body_skin::BodySkin;
 use body_skin::ReleasedElements;
 pub use caught::CaughtParticle;
-use closest_point::ClosestPoint;
 pub use motion::ObstaclePose;
+use numerics::closest_point::ClosestPoint;
 use numerics::parallel;
+use numerics::swept;
+use numerics::swept::SweptBoxTree;
 use numerics::tree::{Cuboid, TriangleTree};
 use numerics::vector::{DVec3, to_f32};
 pub use obstacle::{Ground, Obstacle};
@@ -40,7 +39,6 @@ pub use overlap::{Overlap, OverlapPartner, Penetration, Separation};
 pub use pair::ContactParams;
 use std::sync::Mutex;
 use surface::Positions;
-use swept::BoxTree;
 use vertex::{ContactRules, MovingSurface};
 
 /// Vertices or edges in a parallel task: about 20 µs of work.
@@ -213,7 +211,7 @@ impl CollisionScene<'_> {
         (skin, released): (&BodySkin, &ReleasedElements),
         boxes: &[Cuboid],
         index: usize,
-        act: &mut dyn FnMut(&SkinObstaclePair<'_>, &BoxTree<'_>),
+        act: &mut dyn FnMut(&SkinObstaclePair<'_>, &SweptBoxTree<'_>),
     ) {
         let obstacle = &self.obstacles[index];
         let rules = ContactRules { gap: obstacle.thickness, reach: REACH * obstacle.thickness, push: true };
@@ -297,7 +295,7 @@ fn path_of(poses: &[Positions<'_>], point: u32, path: &mut Vec<DVec3>) {
 
 impl SkinObstaclePair<'_> {
     /// Particles of the skin against triangles of the obstacle.
-    fn particles(&self, tree: &BoxTree<'_>, out: &mut Vec<Contact>) {
+    fn particles(&self, tree: &SweptBoxTree<'_>, out: &mut Vec<Contact>) {
         let bounds = tree.bounds;
         // Made before the loop: a thread of the pool that waits for another's tree could wait forever.
         let solid = self.solid_at_start(&bounds);
@@ -350,7 +348,7 @@ impl SkinObstaclePair<'_> {
     }
 
     /// Sharp points of the obstacle against triangles of the skin.
-    fn points(&self, tree: &BoxTree<'_>, out: &mut Vec<Contact>) {
+    fn points(&self, tree: &SweptBoxTree<'_>, out: &mut Vec<Contact>) {
         let find_in = |(): &mut (), points: &[u32], out: &mut Vec<Contact>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
             for point in points {

@@ -12,9 +12,10 @@
 //! Limit: bodies of which only edges cross, with no point of one inside the other, are not seen.
 
 use super::surface::{Moment, TriangleSurface};
-use super::{BodySkin, ClosestPoint, CollisionScene, Obstacle};
+use super::{BodySkin, CollisionScene, Obstacle};
 use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
 use crate::tets::{Enclosure, Exit, bounds};
+use numerics::closest_point::ClosestPoint;
 use numerics::tree::TriangleTree;
 use numerics::vector::{DVec3, to_f32};
 use serde::{Deserialize, Serialize};

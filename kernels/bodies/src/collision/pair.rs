@@ -2,10 +2,10 @@
 
 use super::body_skin::BodySkin;
 use super::edge;
-use super::swept::{self, BoxTree};
 use super::vertex::{self, ContactRules, MovingSurface};
 use super::{CollisionScene, OverlapPartner, REACH, collect_in_order};
 use crate::mass_spring::{Contact, ContactQuery};
+use numerics::swept::{self, SweptBoxTree};
 use numerics::tree::Cuboid;
 use numerics::vector::DVec3;
 
@@ -18,7 +18,7 @@ pub struct ContactParams {
     pub friction: f64,
 }
 
-/// Elements nearer than this fraction of the gap at rest are considered joined.
+/// SweptElements nearer than this fraction of the gap at rest are considered joined.
 const JOINED: f64 = 1e-6;
 
 /// Two moving skins, or one with itself.
@@ -65,8 +65,8 @@ impl Marks {
 struct Boxes<'a> {
     /// Bounds of all its particles.
     bounds: Cuboid,
-    faces: BoxTree<'a>,
-    edges: BoxTree<'a>,
+    faces: SweptBoxTree<'a>,
+    edges: SweptBoxTree<'a>,
 }
 
 impl CollisionScene<'_> {

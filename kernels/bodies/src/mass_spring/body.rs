@@ -9,13 +9,13 @@
 //! inverted at rest is treated as its mirror image, and a flat one has no volume to preserve. Metres, seconds,
 //! kilograms.
 
-use super::adjacency::Adjacency;
-use super::particle_order::Order;
-use super::partition::Partition;
 use super::regions::Regions;
 use super::tet_springs::{EDGES, edges, neighbours_of_missing};
 use crate::embedding::{EmbeddedPoint, with_riding};
+use numerics::adjacency::Adjacency;
+use numerics::cluster_order::ClusterOrder;
 use numerics::masked::Masked;
+use numerics::partition::Partition;
 use numerics::vector::DVec3;
 
 /// Shortest length used in k = E·ΣV/L², as a fraction of the mean length: bounds k at duplicate points to 1e6 times
@@ -114,7 +114,7 @@ pub enum BodyError {
 /// Particles, springs and tetrahedra in the solver's order.
 #[derive(Clone, Debug)]
 pub struct SoftBody {
-    pub(super) order: Order,
+    pub(super) order: ClusterOrder,
     /// Rest positions, in the solver's order.
     pub(super) rest: Vec<DVec3>,
     pub(super) mass: Vec<f64>,
@@ -367,7 +367,7 @@ impl SoftBody {
         ends.extend(mesh.missing);
         let mesh_spring_count = ends.len();
         ends.extend(joints.iter().map(|spring| spring.ends));
-        let order = Order::new(&points, ends.iter().copied());
+        let order = ClusterOrder::new(&points, ends.iter().copied());
 
         let length = |ends: &[u32; 2]| (points[ends[0] as usize] - points[ends[1] as usize]).norm();
         let lengths: Vec<f64> =
@@ -446,7 +446,7 @@ fn distinct(what: &'static str, index: usize, particles: &[u32], count: usize) -
 }
 
 /// Tetrahedra with a volume to preserve: their indices in the mesh, and their corners in the solver's order.
-fn with_volume(mesh: &Mesh<'_>, points: &[DVec3], order: &Order) -> (Vec<u32>, Vec<[u32; 4]>) {
+fn with_volume(mesh: &Mesh<'_>, points: &[DVec3], order: &ClusterOrder) -> (Vec<u32>, Vec<[u32; 4]>) {
     let keep = |(index, tet): (usize, &[u32; 4])| {
         let corners = tet.map(|corner| points[corner as usize]);
         let signed = volume(corners);

@@ -9,7 +9,7 @@
 //! Limit: within a stage the surfaces of a contact are planes.
 
 use super::body::SoftBody;
-use super::rank_one::add_square;
+use numerics::rank_one::add_square;
 use numerics::vector::DVec3;
 
 /// Penalty stiffness κ ÷ effective stiffness of the particles, springs and inertia together. Larger values keep the

@@ -4,9 +4,9 @@
 use super::assemble::velocities;
 use super::body::SoftBody;
 use super::contact::{ContactConstraint, ContactMode};
-use super::particle_order::pieces;
-use super::predictor::CayleyRotation;
 use super::stage::{FrameContext, Stage, StageSolver};
+use numerics::pieces::pieces;
+use numerics::rotation::CayleyRotation;
 use numerics::vector::{DMat3, DVec3};
 
 /// Total residual and translational stiffness of each group.

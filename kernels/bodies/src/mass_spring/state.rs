@@ -2,8 +2,8 @@
 
 use super::body::SoftBody;
 use super::bounce::Impact;
-use super::cholesky::Lower;
 use super::coarse::ContactFilters;
+use numerics::cholesky::EnvelopeMatrix;
 use serde::{Deserialize, Serialize};
 
 /// Everything that later frames depend on: after saving and restoring it they have the same bits.
@@ -40,7 +40,7 @@ pub struct State {
 /// The factored coarse matrix, kept while it is good enough; iteration counts depend on it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct CachedCoarseFactor {
-    pub(super) factor: Lower,
+    pub(super) factor: EnvelopeMatrix,
     pub(super) filters: ContactFilters,
     /// Iterations of a solve when it was new, for each stage of a step; 0 before the first.
     pub(super) initial_iterations: [u32; 2],
