@@ -55,7 +55,7 @@ const SEPARATION_FRAMES: u32 = 12;
 inputs! { INPUTS:
     BODIES: Input<Many> = Input::many("bodies", Kind::Tets,
         "Bodies from Tetrahedralize, in their initial positions. A surface mesh that comes with the tets is carried \
-         along by them; without one, the boundary of the tets is the surface.").read_at(|_| Times::START);
+         along by them and is what touches other things; without one, the boundary of the tets is the surface.").read_at(|_| Times::START);
     COLLIDERS: Input<Many> = Input::many("colliders", Kind::Mesh,
         "Meshes that bodies collide with: hands, rolling pins, bowls. They may move, rotate and deform.")
         .read_at(|_| Times::within_step(COLLIDER_SAMPLES));
@@ -295,7 +295,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
-    7,
+    8,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
      other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
      pins hold them. `stiffness` has the same effect at any mesh resolution, and the solver is stable for any \

@@ -25,7 +25,7 @@ use bodies::tets::{Cage, CagedSurface, ClosedSurface, FillSettings, PolygonSurfa
 use engine::prelude::*;
 
 use crate::shared::attributes::{BODY_NUMBER, FILL, SLIVER, SURFACE_POINT};
-use crate::shared::pieces::pieces;
+use numerics::pieces::pieces;
 
 choice! {
     /// How the tets are made.

@@ -105,7 +105,7 @@ impl ContactFinder for SceneContacts<'_> {
                     let normal = if passed { before.normal } else { after.normal };
                     let offset = normal.dot(&(to - after.normal * after.distance));
                     out.push(Contact {
-                        particles: [*particle, 0, 0, 0],
+                        points: [*particle, 0, 0, 0],
                         weights: [1.0, 0.0, 0.0, 0.0],
                         normal: normal.into(),
                         offset,

@@ -27,17 +27,32 @@ impl EmbeddedPoint {
         Self { particles: [particle, 0, 0, 0], weights: [1.0, 0.0, 0.0, 0.0] }
     }
 
+    /// The particles that it depends on, with their weights.
+    #[inline]
+    pub fn sides(&self) -> impl Iterator<Item = (u32, f64)> {
+        self.particles.into_iter().zip(self.weights).filter(|(_, weight)| *weight != 0.0)
+    }
+
     /// The point's position for the given particle positions, metres; exact for a point that coincides with a
     /// particle.
     #[inline]
     pub fn position(&self, positions: &[[f64; 3]]) -> [f64; 3] {
         let mut sum = [0.0; 3];
-        for (particle, weight) in self.particles.iter().zip(self.weights).filter(|(_, weight)| *weight != 0.0) {
-            let position = positions[*particle as usize];
+        for (particle, weight) in self.sides() {
+            let position = positions[particle as usize];
             (0..3).for_each(|k| sum[k] += position[k] * weight);
         }
         sum
     }
+}
+
+/// The positions of particles, followed by those of points that ride along on them, metres.
+pub fn with_riding(mut particles: Vec<[f64; 3]>, riding: &[EmbeddedPoint]) -> Vec<[f64; 3]> {
+    let count = particles.len();
+    particles.resize(count + riding.len(), [0.0; 3]);
+    let (particles_only, out) = particles.split_at_mut(count);
+    parallel::fill(out, 16 * TASK, |n| riding[n].position(particles_only));
+    particles
 }
 
 /// Binds the points `carried` to `tets` over `points`; all in metres. `None` if no tet has a volume.

@@ -1,4 +1,3 @@
 //! Helpers shared by the family's nodes.
 
 pub(crate) mod attributes;
-pub(crate) mod pieces;

@@ -125,12 +125,13 @@ impl Run {
         };
         let is_start = interval.frames[0] == interval.frames[1];
         let friction = ParticleNumber::of(cx, &self.inputs, FRICTION)?;
+        let friction_mask = friction.mask.map(|mask| setup.at_contact_points(mask));
         let rub = ContactParams { thickness: f64::from(cx.get(THICKNESS)), friction: f64::from(friction.value) };
         let obstacles = obstacles::obstacles(cx.samples(COLLIDERS), interval.seconds, rub.thickness, rub.friction)?;
         let mut scene = scene(cx, &setup, &obstacles, rub);
-        scene.friction = friction.mask.as_deref();
+        scene.friction = friction_mask.as_deref();
         if is_start {
-            let (overlaps, inside) = scene.overlaps(&self.state.positions);
+            let (overlaps, inside) = scene.overlaps(&setup.contact_points(&self.state.positions));
             self.metrics.set(STARTED_INSIDE, inside as f64);
             set_overlaps(&setup, &overlaps, &mut self.metrics);
             self.metrics.set(CARRIED_OUTSIDE, setup.carried_outside() as f64);
@@ -143,9 +144,9 @@ impl Run {
         scene.separation = Some(Separation { overlaps: &overlaps, frames: SEPARATION_FRAMES, over, seconds });
         let mut goals = std::mem::take(&mut self.goals);
         let mut influences = self.influences(cx, &setup, &mut goals, interval)?;
-        let before = self.state.positions.clone();
+        let before = setup.contact_points(&self.state.positions);
         let report = self.solve(cx, &mut solving, &influences, &scene, interval)?;
-        self.caught = scene.caught_after(&before, &self.state.positions);
+        self.caught = scene.caught_after(&before, &setup.contact_points(&self.state.positions));
         let at_start = AT_START.map(|metric| (metric, self.metrics.get(metric).unwrap_or(0.0)));
         self.metrics = measured(&report, &self.state);
         at_start.into_iter().for_each(|(metric, value)| self.metrics.set(metric, value));
@@ -270,9 +271,9 @@ impl Run {
     /// Sets the metrics of contacts from the positions that are returned. Until what overlapped at the start is out,
     /// surfaces went through nothing; returns whether it is.
     fn measure_contacts(&mut self, setup: &SimulationSetup, scene: &CollisionScene<'_>, thickness: f64) -> bool {
-        let returned: Vec<[f64; 3]> =
-            self.state.positions.iter().map(|position| position.map(|x| f64::from(x as f32))).collect();
-        let found = scene.penetration(&returned, &setup.carried_at(&self.state.positions));
+        let points = setup.contact_points(&self.state.positions);
+        let returned: Vec<[f64; 3]> = points.iter().map(|point| point.map(|x| f64::from(x as f32))).collect();
+        let found = scene.penetration(&returned);
         let started = scene.separation.is_some_and(|separation| !separation.overlaps.is_empty());
         let is_over = self.frames_over >= SEPARATION_FRAMES;
         if started && is_over {
@@ -283,7 +284,7 @@ impl Run {
         self.metrics.set(DEEPEST_OVERLAP, found.deepest);
         self.metrics.set(POINTS_INSIDE, found.inside as f64);
         self.metrics.set(DEEPEST_PENETRATION, through);
-        let let_go = if scene.obstacles.is_empty() { 0 } else { setup.let_go(&self.state.positions) };
+        let let_go = if scene.obstacles.is_empty() { 0 } else { setup.let_go(&points) };
         self.metrics.set(LET_GO, let_go as f64);
         all_out
     }

@@ -2,7 +2,7 @@
 //! components.
 
 use bodies::collision::BodySkin;
-use bodies::embedding::{EmbeddedPoint, embed};
+use bodies::embedding::{EmbeddedPoint, embed, with_riding};
 use bodies::mass_spring::{BodyError, BodySpring, Material, Mesh, SoftBody};
 use bodies::tets::{boundary, edges, missing_edges};
 use engine::prelude::*;
@@ -12,7 +12,7 @@ use super::joints::{Couple, couple};
 use super::pins::{BoundPins, bind_pins};
 use super::{BODIES, COUPLING_RADIUS, COUPLING_STIFFNESS, DAMPING, DENSITY, PINS, STIFFNESS};
 use crate::shared::attributes::{BODY_NUMBER, FILL, SLIVER, SURFACE_POINT};
-use crate::shared::pieces::pieces;
+use numerics::pieces::pieces;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -43,16 +43,16 @@ pub(super) struct SimulationSetup {
     pub(super) wires: Vec<std::ops::Range<usize>>,
     /// Which particles are on a surface.
     pub(super) outer: Vec<bool>,
-    /// The surface of each connected body, for contacts.
+    /// The surface of each connected body, for contacts: that of the mesh that rides along where there is one.
     pub(super) skins: Vec<BodySkin>,
+    /// The points of meshes that ride along: contact points after the particles.
+    riding: Vec<EmbeddedPoint>,
     pub(super) pins: BoundPins,
     /// The output components, except for their positions.
     pub(super) surface: Component,
     pub(super) body: Component,
     /// The embedding of each point of the surface in the tets.
     pub(super) carriers: Vec<EmbeddedPoint>,
-    /// By skin, the points of the surface that are no particles, as indices of `carriers`.
-    pub(super) carried: Vec<Vec<usize>>,
 }
 
 /// One wire's surface: triangles of its particles, and its output mesh with the embedding of its points.
@@ -61,6 +61,8 @@ struct Surface {
     missing: Vec<[u32; 2]>,
     mesh: Component,
     carriers: Vec<EmbeddedPoint>,
+    /// Whether these ride along, rather than being particles.
+    rides: bool,
 }
 
 /// A masked param over the particles of all bodies, which may come through several wires.
@@ -118,7 +120,7 @@ impl SimulationSetup {
         let (mut rest, mut all, mut slivers, mut missing) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut fill = Vec::new();
         let (mut wires, mut triangles, mut carriers) = (Vec::new(), Vec::new(), Vec::new());
-        let mut outer = Vec::new();
+        let (mut outer, mut riding, mut riding_triangles) = (Vec::new(), Vec::new(), Vec::new());
         for (wire, geometry) in inputs.bodies.iter().enumerate() {
             let own = geometry.require(Kind::Tets)?;
             let first = rest.len() as u32;
@@ -135,10 +137,16 @@ impl SimulationSetup {
             }
             missing.extend(found.missing.iter().map(|edge| edge.map(|end| end + first)));
             triangles.extend(found.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
-            carriers.extend(found.carriers.iter().map(|carrier| EmbeddedPoint {
+            let carried = found.carriers.iter().map(|carrier| EmbeddedPoint {
                 particles: carrier.particles.map(|particle| particle + first),
                 ..*carrier
-            }));
+            });
+            carriers.extend(carried.clone());
+            if found.rides {
+                let before = riding.len() as u32;
+                riding_triangles.extend(found.mesh.triangles().corners.iter().map(|face| face.map(|c| c + before)));
+                riding.extend(carried);
+            }
             let surface_points = own.get(SURFACE_POINT);
             outer.extend((0..own.point_count()).map(|point| surface_points.is_some_and(|rows| rows[point] >= 0)));
             wires.push(first as usize..rest.len());
@@ -167,7 +175,7 @@ impl SimulationSetup {
             surface: surface.map_or_else(|| Component::mesh(Vec::new(), Vec::new(), Vec::new()), Ok)?,
             body: body.map_or_else(|| Component::tets(Vec::new(), Vec::new()), Ok)?,
             carriers,
-            carried: Vec::new(),
+            riding,
             rest,
             tets: all,
             slivers,
@@ -177,15 +185,47 @@ impl SimulationSetup {
             wires,
         };
         let links = setup.body(&material)?.springs();
-        setup.skins = skins(&setup.rest, &triangles, &parts, &links)?;
-        setup.carried = carried(&setup.skins, &setup.carriers, setup.rest.len());
+        setup.skins = setup.skins(triangles, riding_triangles, &parts, &links)?;
         Ok(setup)
     }
 
-    /// The positions of these points, as they are returned.
-    pub(super) fn carried_at(&self, positions: &[[f64; 3]]) -> Vec<Vec<[f64; 3]>> {
-        let at = |point: &usize| self.carriers[*point].position(positions).map(|x| f64::from(x as f32));
-        self.carried.iter().map(|points| points.iter().map(at).collect()).collect()
+    /// The surface of each connected body: of the triangles over points that ride along, or where there are none, those
+    /// over particles.
+    fn skins(
+        &self,
+        mut triangles: Vec<[u32; 3]>,
+        mut riding: Vec<[u32; 3]>,
+        parts: &[u32],
+        links: &[[u32; 2]],
+    ) -> Result<Vec<BodySkin>> {
+        let count = self.rest.len() as u32;
+        let part = |corners: &[u32; 3]| {
+            let first = corners[0].checked_sub(count).and_then(|point| self.riding[point as usize].sides().next());
+            parts[first.map_or(corners[0], |side| side.0) as usize]
+        };
+        riding.iter_mut().flatten().for_each(|corner| *corner += count);
+        let mut with_riding: Vec<u32> = riding.iter().map(part).collect();
+        with_riding.sort_unstable();
+        triangles.retain(|corners| with_riding.binary_search(&part(corners)).is_err());
+        triangles.extend(riding);
+        triangles.sort_by_key(part);
+        let surfaces: Vec<&[[u32; 3]]> = triangles.chunk_by(|a, b| part(a) == part(b)).collect();
+        let skins = BodySkin::several(&self.rest, &self.riding, &surfaces, links);
+        skins.map_err(|error| Error::refused(format!("`bodies`: {error}")))
+    }
+
+    /// The contact points with particles at `positions`.
+    pub(super) fn contact_points(&self, positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        with_riding(positions.to_vec(), &self.riding)
+    }
+
+    /// The number at each contact point of one that is given for particles.
+    pub(super) fn at_contact_points(&self, mut numbers: Vec<f32>) -> Vec<f32> {
+        let of =
+            |point: &EmbeddedPoint| point.sides().map(|(of, weight)| f64::from(numbers[of as usize]) * weight).sum();
+        let riding: Vec<f64> = self.riding.iter().map(of).collect();
+        numbers.extend(riding.into_iter().map(|number| number.max(0.0) as f32));
+        numbers
     }
 
     /// The number of points of the surface that are farther outside the tets than a tet is large.
@@ -196,7 +236,9 @@ impl SimulationSetup {
 
     /// The wire that the particles of a skin came through.
     pub(super) fn wire_of(&self, skin: usize) -> Option<usize> {
-        let first = *self.skins[skin].particles().first()? as usize;
+        let first = *self.skins[skin].points().first()? as usize;
+        let carrier = first.checked_sub(self.rest.len()).map(|point| &self.riding[point]);
+        let first = carrier.and_then(|carrier| carrier.sides().next()).map_or(first, |side| side.0 as usize);
         self.wires.iter().position(|wire| wire.contains(&first))
     }
 
@@ -208,11 +250,12 @@ impl SimulationSetup {
             slivers: &self.slivers,
             fill: &self.fill,
             missing: &self.missing,
+            riding: &self.riding,
         };
         SoftBody::new(&mesh, &material.material(), &self.joints).map_err(refusal)
     }
 
-    /// Number of edges of the skins that colliders release with particles at `x`.
+    /// Number of edges of the skins that colliders release with contact points at `x`.
     pub(super) fn let_go(&self, x: &[[f64; 3]]) -> usize {
         self.skins.iter().map(|skin| skin.released_edges(x)).sum()
     }
@@ -276,6 +319,7 @@ impl Surface {
             missing: missing_edges(&edges, tets.tet_corners()),
             mesh: mesh.clone(),
             carriers: rows.iter().map(|row| EmbeddedPoint::at_particle(*row)).collect(),
+            rides: false,
         }
     }
 
@@ -283,6 +327,7 @@ impl Surface {
     fn around(wire: usize, tets: &Component, mesh: Option<&Component>) -> Result<Self> {
         let (points, corners) = (tets.positions(), tets.tet_corners());
         let triangles: Vec<[u32; 3]> = boundary(corners, points).iter().map(|face| face.corners).collect();
+        let rides = mesh.is_some();
         let (mesh, carriers) = match mesh {
             Some(mesh) => {
                 let carriers = embed(points, corners, mesh.positions());
@@ -305,7 +350,7 @@ impl Surface {
                 (mesh, used.iter().map(|point| EmbeddedPoint::at_particle(*point)).collect())
             }
         };
-        Ok(Self { triangles, missing: Vec::new(), mesh, carriers })
+        Ok(Self { triangles, missing: Vec::new(), mesh, carriers, rides })
     }
 }
 
@@ -316,27 +361,4 @@ fn rows(tets: &Component, mesh: &Component) -> Option<Vec<u32>> {
         *rows.get_mut(*row as usize)? = point as u32;
     }
     (!rows.is_empty() && !rows.contains(&u32::MAX)).then_some(rows)
-}
-
-/// By skin, the surface points that are no particles.
-fn carried(skins: &[BodySkin], carriers: &[EmbeddedPoint], particles: usize) -> Vec<Vec<usize>> {
-    let mut skin_of = vec![None; particles];
-    for (index, skin) in skins.iter().enumerate() {
-        skin.particles().iter().for_each(|particle| skin_of[*particle as usize] = Some(index));
-    }
-    let mut carried = vec![Vec::new(); skins.len()];
-    for (point, carrier) in carriers.iter().enumerate().filter(|(_, carrier)| carrier.weights[0] != 1.0) {
-        if let Some(skin) = skin_of[carrier.particles[0] as usize] {
-            carried[skin].push(point);
-        }
-    }
-    carried
-}
-
-fn skins(rest: &[[f64; 3]], triangles: &[[u32; 3]], parts: &[u32], links: &[[u32; 2]]) -> Result<Vec<BodySkin>> {
-    let part = |corners: &[u32; 3]| parts[corners[0] as usize];
-    let mut sorted = triangles.to_vec();
-    sorted.sort_by_key(part);
-    let surfaces: Vec<&[[u32; 3]]> = sorted.chunk_by(|a, b| part(a) == part(b)).collect();
-    BodySkin::several(rest, &surfaces, links).map_err(|error| Error::refused(format!("`bodies`: {error}")))
 }

@@ -5,6 +5,7 @@ use engine::cook::{Engine, Settings};
 mod bounce;
 mod goals;
 mod inside;
+mod riding;
 
 use inside::solid;
 

@@ -1,27 +1,36 @@
 //! The skin of a body: its surface triangles, and which of their elements are too close at rest to count as contacts.
 
-use super::closest_point::{ClosestPoint, along};
-use super::obstacle::{check_points, check_triangles};
+use super::obstacle::{check_points, check_triangles, narrow};
 use super::surface::{Edge, Moment, NONE, TriangleSurface};
-use super::swept::Elements;
 use super::{CaughtParticle, CollisionError};
+use crate::embedding::{EmbeddedPoint, with_riding};
+use crate::tets::SolidAngles;
+use numerics::closest_point::{ClosestPoint, along};
+use numerics::swept::SweptElements;
+use numerics::vector::DVec3;
 use std::collections::VecDeque;
 
 /// An edge longer than this many times its rest length and the skin's mean edge is released.
 const LONG: f64 = 8.0;
 
-/// A closed surface over particles, facing outwards.
+/// Winding number from which a particle is inside a surface that rides along, which may be open or cross itself.
+const INSIDE: f64 = 0.5;
+
+/// A surface over particles, closed and facing outwards, or over points that ride along on them.
 #[derive(Clone, Debug)]
 pub struct BodySkin {
     pub(super) surface: TriangleSurface,
-    pub(super) faces: Elements<3>,
-    pub(super) edges: Elements<2>,
+    pub(super) faces: SweptElements<3>,
+    pub(super) edges: SweptElements<2>,
     rest: Vec<[f64; 3]>,
     /// Mean rest length of the edges, metres.
     mean: f64,
-    /// Particles that meet the ground, obstacles and other skins, ascending: those of the surface and those within.
+    /// Contact points that meet the ground, obstacles and other skins, ascending: those of the surface and the particles
+    /// within.
     pub(super) touching: Vec<u32>,
-    /// For each surface particle, those within two links, ascending.
+    /// Number of particles of the body, which other contact points ride along on.
+    particles: usize,
+    /// For each particle of the surface, those within two links, ascending; for each point that rides along, what it rides on.
     starts: Vec<u32>,
     rings: Vec<u32>,
 }
@@ -33,33 +42,49 @@ impl BodySkin {
     /// # Errors
     /// If an index is out of range or a coordinate is not finite.
     pub fn new(rest: &[[f64; 3]], triangles: &[[u32; 3]], links: &[[u32; 2]]) -> Result<Self, CollisionError> {
-        Self::several(rest, &[triangles], links).map(|mut skins| skins.swap_remove(0))
+        Self::several(rest, &[], &[triangles], links).map(|mut skins| skins.swap_remove(0))
     }
 
-    /// Skins of several bodies, which `links` may join. An inner particle belongs to the first skin from which a walk
-    /// along links reaches it.
+    /// Skins of several bodies, which `links` may join. Corners of surfaces are contact points: particles, of which there
+    /// are as many as in `rest`, and after them the points that are `riding` along on these. A surface is over the ones or
+    /// the others. An inner particle belongs to the first skin from which a walk along links reaches it, if it is inside
+    /// what rides along.
     ///
     /// # Errors
     /// As [`BodySkin::new`].
     pub fn several(
         rest: &[[f64; 3]],
+        riding: &[EmbeddedPoint],
         surfaces: &[&[[u32; 3]]],
         links: &[[u32; 2]],
     ) -> Result<Vec<Self>, CollisionError> {
+        let particles = rest.len();
+        if let Some(index) = links.iter().position(|ends| ends.iter().any(|end| *end as usize >= particles)) {
+            return Err(CollisionError::Link { index, ends: links[index], count: particles });
+        }
+        let rest = &with_riding(rest.to_vec(), riding);
         surfaces.iter().try_for_each(|triangles| check_triangles(rest.len(), triangles))?;
         check_points(rest)?;
-        if let Some(index) = links.iter().position(|ends| ends.iter().any(|end| *end as usize >= rest.len())) {
-            return Err(CollisionError::Link { index, ends: links[index], count: rest.len() });
-        }
-        let surfaces: Vec<_> = surfaces.iter().map(|triangles| TriangleSurface::new(rest.len(), triangles)).collect();
+        let surfaces: Vec<_> = surfaces
+            .iter()
+            .map(|triangles| {
+                let surface = TriangleSurface::new(rest.len(), triangles);
+                let turn =
+                    surface.closed && triangles[0][0] as usize >= particles && signed_volume(triangles, rest) < 0.0;
+                if turn { TriangleSurface::new(rest.len(), &turned(triangles)) } else { surface }
+            })
+            .collect();
         let edges = surfaces.iter().flat_map(|surface| &surface.edges).map(|edge| edge.ends);
-        let neighbours = Neighbours::new(rest.len(), links.iter().copied().chain(edges));
-        let touching = touching(&surfaces, &neighbours, rest.len());
+        let carried = (particles as u32..).zip(riding);
+        let carried = carried.flat_map(|(point, carrier)| carrier.sides().map(move |(particle, _)| [point, particle]));
+        let neighbours = Neighbours::new(rest.len(), links.iter().copied().chain(edges).chain(carried));
+        let touching = touching(&surfaces, &neighbours, rest, particles);
         let skin = |(surface, touching): (TriangleSurface, Vec<u32>)| {
-            let (starts, rings) = rings(&surface, &neighbours, rest.len());
+            let (starts, rings) = rings(&surface, &neighbours, rest.len(), particles);
             Self {
-                faces: Elements::new(surface.triangles.clone(), rest),
-                edges: Elements::new(surface.edges.iter().map(|edge| edge.ends).collect(), rest),
+                particles,
+                faces: SweptElements::new(surface.triangles.clone(), rest),
+                edges: SweptElements::new(surface.edges.iter().map(|edge| edge.ends).collect(), rest),
                 rest: rest.to_vec(),
                 mean: surface.edges.iter().map(|edge| edge_length(edge, rest)).sum::<f64>()
                     / surface.edges.len().max(1) as f64,
@@ -72,17 +97,23 @@ impl BodySkin {
         Ok(surfaces.into_iter().zip(touching).map(skin).collect())
     }
 
-    /// The particles that meet the ground, obstacles and other skins, ascending: those of the surface and those within.
-    pub fn particles(&self) -> &[u32] {
+    /// The contact points that meet the ground, obstacles and other skins, ascending: those of the surface and the
+    /// particles within.
+    pub fn points(&self) -> &[u32] {
         &self.touching
     }
 
-    /// Number of particles of the body, interior ones included.
+    /// Number of contact points of the body, all of its particles included.
     pub(super) fn len(&self) -> usize {
         self.rest.len()
     }
 
-    /// Surface particles within two links of a particle, itself included.
+    /// Whether a contact point rides along on particles.
+    pub(super) fn rides(&self, point: u32) -> bool {
+        point as usize >= self.particles
+    }
+
+    /// Surface particles within two links of one of them, itself included; the particles that a riding point rides on.
     pub(super) fn around(&self, particle: u32) -> &[u32] {
         &self.rings[self.starts[particle as usize] as usize..self.starts[particle as usize + 1] as usize]
     }
@@ -132,6 +163,13 @@ impl BodySkin {
         all
     }
 
+    /// These particles, ascending, as the released ones.
+    pub(super) fn releasing_particles(&self, released: &[u32]) -> ReleasedElements {
+        let mut particles = vec![false; self.len()];
+        released.iter().for_each(|particle| particles[*particle as usize] = true);
+        ReleasedElements { particles, ..ReleasedElements::default() }
+    }
+
     /// Number of edges released by obstacles with particles at `x`: those more than eight times as long as at rest
     /// and as the skin's mean edge.
     pub fn released_edges(&self, x: &[[f64; 3]]) -> usize {
@@ -152,7 +190,7 @@ impl BodySkin {
     }
 }
 
-/// Elements of a skin that obstacles have released, because they are overstretched. A collider that snags the skin
+/// SweptElements of a skin that obstacles have released, because they are overstretched. A collider that snags the skin
 /// would stretch it without limit, since contacts keep it on the side it came from.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ReleasedElements {
@@ -208,10 +246,27 @@ impl Neighbours {
     }
 }
 
-/// The particles of each surface and those within, ascending: a walk from all surfaces at once gives each particle to
-/// the first that reaches it.
-fn touching(surfaces: &[TriangleSurface], neighbours: &Neighbours, count: usize) -> Vec<Vec<u32>> {
-    let mut skin_of = vec![NONE; count];
+/// Six times the volume that triangles enclose.
+fn signed_volume(triangles: &[[u32; 3]], places: &[[f64; 3]]) -> f64 {
+    let origin = DVec3::from(places[triangles[0][0] as usize]);
+    let corners = |face: &[u32; 3]| face.map(|corner| DVec3::from(places[corner as usize]) - origin);
+    triangles.iter().map(corners).map(|[a, b, c]| a.dot(&b.cross(&c))).sum()
+}
+
+/// Triangles that face the other way.
+fn turned(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
+    triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect()
+}
+
+/// The points of each surface and the particles within, ascending: a walk from all surfaces at once gives each particle
+/// to the first that reaches it. Particles outside what rides along on them touch nothing.
+fn touching(
+    surfaces: &[TriangleSurface],
+    neighbours: &Neighbours,
+    rest: &[[f64; 3]],
+    particles: usize,
+) -> Vec<Vec<u32>> {
+    let mut skin_of = vec![NONE; rest.len()];
     let mut queue = VecDeque::new();
     for (skin, surface) in (0..).zip(surfaces) {
         queue.extend(surface.vertices.iter().map(|vertex| (*vertex, skin)));
@@ -223,19 +278,31 @@ fn touching(surfaces: &[TriangleSurface], neighbours: &Neighbours, count: usize)
         }
     }
     let mut touching = vec![Vec::new(); surfaces.len()];
-    for (particle, skin) in (0..).zip(skin_of).filter(|(_, skin)| *skin != NONE) {
-        touching[skin as usize].push(particle);
+    for (point, skin) in (0..).zip(skin_of).filter(|(_, skin)| *skin != NONE) {
+        touching[skin as usize].push(point);
+    }
+    for (surface, touching) in surfaces.iter().zip(&mut touching).filter(|_| particles < rest.len()) {
+        let rides = surface.vertices.first().is_some_and(|first| *first as usize >= particles);
+        let solid = rides.then(|| SolidAngles::new(&narrow(rest), &surface.triangles));
+        let is_inside = |point: u32| {
+            let winding = solid.as_ref().map_or(1.0, |solid| solid.winding(rest[point as usize].into()));
+            (point as usize) < particles && winding >= INSIDE
+        };
+        touching.retain(|point| surface.vertices.binary_search(point).is_ok() || is_inside(*point));
     }
     touching
 }
 
-/// For each surface particle, the surface particles within two links of it.
-fn rings(surface: &TriangleSurface, neighbours: &Neighbours, count: usize) -> (Vec<u32>, Vec<u32>) {
+/// For each surface particle, the surface particles within two links of it; for each point that rides along, the particles
+/// that it rides on.
+fn rings(surface: &TriangleSurface, neighbours: &Neighbours, count: usize, particles: usize) -> (Vec<u32>, Vec<u32>) {
     let mut outer = vec![false; count];
     surface.vertices.iter().for_each(|vertex| outer[*vertex as usize] = true);
     let (mut starts, mut rings) = (vec![0], Vec::new());
     for particle in 0..count as u32 {
-        if outer[particle as usize] {
+        if particle as usize >= particles {
+            rings.extend(neighbours.of(particle).filter(|other| (*other as usize) < particles));
+        } else if outer[particle as usize] {
             let near = neighbours.of(particle).flat_map(|next| neighbours.of(next).chain([next]));
             let mut ring: Vec<u32> = near.chain([particle]).filter(|other| outer[*other as usize]).collect();
             ring.sort_unstable();

@@ -7,9 +7,10 @@
 //!
 //! Limits: open obstacles have no wrong side; there is no way back below the ground; a body of which most particles are beyond an obstacle is left there.
 
-use super::{CollisionScene, ReleasedElements, SkinObstaclePair, swept, vertex};
+use super::{CollisionScene, ReleasedElements, SkinObstaclePair, vertex};
 use crate::mass_spring::ContactQuery;
 use crate::tets::Enclosure;
+use numerics::swept;
 use numerics::vector::DVec3;
 use serde::{Deserialize, Serialize};
 

@@ -3,10 +3,10 @@
 //! Two edges are in contact if each is its own surface's closest feature to the other. A pair therefore counts only
 //! if the direction between them points out of both surfaces, away from the triangles adjacent to the edges.
 
-use super::closest_point::along;
-use super::coplanarity::{Separation, edge_separation, sign_changes};
 use super::surface::{Edge, Moment, NONE, TriangleSurface};
 use super::vertex::{ContactRules, MovingSurface, ON};
+use numerics::closest_point::along;
+use numerics::coplanarity::{MotionSeparation, edge_separation, sign_changes};
 use numerics::vector::DVec3;
 
 /// Two edges that may be in contact.
@@ -38,8 +38,8 @@ pub(super) fn hit(
     for piece in 0..last {
         let configuration = [pair.configuration(piece), pair.configuration(piece + 1)];
         let apart = edge_separation(&configuration[0], &configuration[1], rules.reach);
-        far &= apart == Separation::Far;
-        if apart == Separation::Unknown
+        far &= apart == MotionSeparation::Far;
+        if apart == MotionSeparation::Unknown
             && let Some(hit) = pair.through(piece, &configuration)
         {
             return Some(hit);

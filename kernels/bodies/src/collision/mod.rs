@@ -15,24 +15,23 @@
 
 mod body_skin;
 mod caught;
-mod closest_point;
-mod coplanarity;
 mod edge;
 mod motion;
 mod obstacle;
 mod overlap;
 mod pair;
 mod surface;
-mod swept;
 mod vertex;
 
 use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
 pub use body_skin::BodySkin;
 use body_skin::ReleasedElements;
 pub use caught::CaughtParticle;
-use closest_point::ClosestPoint;
 pub use motion::ObstaclePose;
+use numerics::closest_point::ClosestPoint;
 use numerics::parallel;
+use numerics::swept;
+use numerics::swept::SweptBoxTree;
 use numerics::tree::{Cuboid, TriangleTree};
 use numerics::vector::{DVec3, to_f32};
 pub use obstacle::{Ground, Obstacle};
@@ -40,7 +39,6 @@ pub use overlap::{Overlap, OverlapPartner, Penetration, Separation};
 pub use pair::ContactParams;
 use std::sync::Mutex;
 use surface::Positions;
-use swept::BoxTree;
 use vertex::{ContactRules, MovingSurface};
 
 /// Vertices or edges in a parallel task: about 20 µs of work.
@@ -117,7 +115,7 @@ pub enum CollisionError {
 pub struct CollisionScene<'a> {
     /// Skins of the bodies.
     pub skins: &'a [BodySkin],
-    /// Factor on the friction of each particle; 1 without.
+    /// Factor on the friction of each contact point; 1 without.
     pub friction: Option<&'a [f32]>,
     /// The ground; it takes precedence over obstacles.
     pub ground: Option<Ground>,
@@ -135,23 +133,28 @@ pub struct CollisionScene<'a> {
 
 impl ContactFinder for CollisionScene<'_> {
     /// The order is: ground contacts by particle; those of what is being pushed apart; those of each obstacle by
-    /// particle, then by its own points, then by edges; then pairs of bodies; then self-contacts.
+    /// particle, then by its own points, then by edges; then pairs of bodies; then self-contacts. An obstacle that a body is
+    /// pushed out of keeps out the particles that are not in it, so that it can go on pressing.
     fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
         self.on_ground(query, out);
-        self.separate(query, out);
+        let pushed = self.separate(query, out);
         let boxes = swept::swept_boxes(&[query.from, query.to]);
         if !self.obstacles.is_empty() {
             for (index, skin) in self.skins.iter().enumerate() {
                 let faces = skin.faces.sweep(&boxes, 0.0);
                 let released = skin.released(query.from);
-                let meeting = |other: &usize| self.separating(index, OverlapPartner::Obstacle(*other)).is_none();
-                for obstacle in (0..self.obstacles.len()).filter(meeting) {
-                    let caught = self.caught_by(obstacle);
-                    let released = &skin.releasing(&released, caught);
-                    self.against_obstacle(query, (skin, released), &boxes, obstacle, &mut |meeting, tree| {
+                for obstacle in 0..self.obstacles.len() {
+                    let pushed = pushed.iter().find(|pushed| (pushed.skin, pushed.obstacle) == (index, obstacle));
+                    let released = match pushed {
+                        Some(pushed) => skin.releasing_particles(&pushed.particles),
+                        None => skin.releasing(&released, self.caught_by(obstacle)),
+                    };
+                    self.against_obstacle(query, (skin, &released), &boxes, obstacle, &mut |meeting, tree| {
                         meeting.particles(tree, out);
-                        meeting.points(&faces, out);
-                        meeting.edges(out);
+                        if pushed.is_none() {
+                            meeting.points(&faces, out);
+                            meeting.edges(out);
+                        }
                     });
                 }
             }
@@ -175,7 +178,7 @@ impl CollisionScene<'_> {
                 let depth = (ground.thickness - before).max(0.0);
                 let (allowed, speed) = rising.map_or((0.0, 0.0), |overlap| self.allowed(overlap, depth, query.times));
                 out.push(Contact {
-                    particles: [*particle, 0, 0, 0],
+                    points: [*particle, 0, 0, 0],
                     weights: [1.0, 0.0, 0.0, 0.0],
                     normal: ground.up,
                     offset: ground.height - allowed,
@@ -189,12 +192,12 @@ impl CollisionScene<'_> {
     }
 
     /// Factor on friction at the point with these weights.
-    fn friction_scale(&self, particles: &[u32], weights: &[f64]) -> f64 {
+    fn friction_scale(&self, points: &[u32], weights: &[f64]) -> f64 {
         let Some(mask) = self.friction else { return 1.0 };
-        let of = |particle: &u32| mask.get(*particle as usize).map_or(1.0, |scale| f64::from(*scale));
+        let of = |point: &u32| mask.get(*point as usize).map_or(1.0, |scale| f64::from(*scale));
         let (mut sum, mut whole) = (0.0, 0.0);
-        for (particle, weight) in particles.iter().zip(weights).filter(|side| *side.1 != 0.0) {
-            sum += of(particle) * weight.abs();
+        for (point, weight) in points.iter().zip(weights).filter(|side| *side.1 != 0.0) {
+            sum += of(point) * weight.abs();
             whole += weight.abs();
         }
         if whole > 0.0 { sum / whole } else { 1.0 }
@@ -208,7 +211,7 @@ impl CollisionScene<'_> {
         (skin, released): (&BodySkin, &ReleasedElements),
         boxes: &[Cuboid],
         index: usize,
-        act: &mut dyn FnMut(&SkinObstaclePair<'_>, &BoxTree<'_>),
+        act: &mut dyn FnMut(&SkinObstaclePair<'_>, &SweptBoxTree<'_>),
     ) {
         let obstacle = &self.obstacles[index];
         let rules = ContactRules { gap: obstacle.thickness, reach: REACH * obstacle.thickness, push: true };
@@ -292,7 +295,7 @@ fn path_of(poses: &[Positions<'_>], point: u32, path: &mut Vec<DVec3>) {
 
 impl SkinObstaclePair<'_> {
     /// Particles of the skin against triangles of the obstacle.
-    fn particles(&self, tree: &BoxTree<'_>, out: &mut Vec<Contact>) {
+    fn particles(&self, tree: &SweptBoxTree<'_>, out: &mut Vec<Contact>) {
         let bounds = tree.bounds;
         // Made before the loop: a thread of the pool that waits for another's tree could wait forever.
         let solid = self.solid_at_start(&bounds);
@@ -345,7 +348,7 @@ impl SkinObstaclePair<'_> {
     }
 
     /// Sharp points of the obstacle against triangles of the skin.
-    fn points(&self, tree: &BoxTree<'_>, out: &mut Vec<Contact>) {
+    fn points(&self, tree: &SweptBoxTree<'_>, out: &mut Vec<Contact>) {
         let find_in = |(): &mut (), points: &[u32], out: &mut Vec<Contact>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
             for point in points {
@@ -391,10 +394,10 @@ impl SkinObstaclePair<'_> {
         collect_in_order(&indices, &find_in, out);
     }
 
-    /// A contact of particles with points of the obstacle, which counts as stopped above the ground.
+    /// A contact of points of the body with points of the obstacle, which counts as stopped above the ground.
     fn contact(
         &self,
-        (particles, weights): ([u32; 4], [f64; 4]),
+        (own, weights): ([u32; 4], [f64; 4]),
         (points, shares): (&[u32], &[f64]),
         normal: DVec3,
         shift: f64,
@@ -407,13 +410,13 @@ impl SkinObstaclePair<'_> {
         let seconds = self.obstacle.seconds * (times[1] - times[0]);
         let stopping = if seconds > 0.0 { (raised_end - raised) / seconds } else { DVec3::zeros() };
         Contact {
-            particles,
+            points: own,
             weights,
             normal: normal.into(),
             offset: normal.dot(&(end + raised_end)) - shift,
             gap,
             velocity: (self.obstacle.velocity_of(times[1], points, shares) + stopping).into(),
-            friction: self.obstacle.friction * self.scene.friction_scale(&particles, &weights),
+            friction: self.obstacle.friction * self.scene.friction_scale(&own, &weights),
             jammed: -normal.dot(&raised_end) > JAMMED * gap,
         }
     }

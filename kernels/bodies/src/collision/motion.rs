@@ -5,7 +5,7 @@
 //! 1987). Poses are met exactly, and a mesh that moves rigidly keeps its shape. Limits: the rotation between two
 //! poses is less than half a turn; a centroid on an arc takes the chord.
 
-use nalgebra::Matrix4;
+use numerics::rotation::best_rotation;
 use numerics::vector::{DMat3, DVec3};
 
 /// Positions at one time in the frame.
@@ -147,64 +147,4 @@ impl PoseInterval {
     fn offset(&self, back: &DMat3, from: &[f64; 3], to: &[f64; 3], along: f64) -> DVec3 {
         (DVec3::from(*from) - self.middles[0]).lerp(&(back * (DVec3::from(*to) - self.middles[1])), along)
     }
-}
-
-/// Quaternion (cosine first) of the rotation that best maps the first points of a covariance Σ a bᵀ to the second:
-/// the dominant eigenvector of Horn's matrix, by Jacobi rotations. The identity if it fits as well as any other.
-fn best_rotation(spread: &DMat3) -> [f64; 4] {
-    /// Preference for the identity, as a fraction of the covariance: above the rounding of degenerate point sets.
-    const CALM: f64 = 1e-13;
-    /// Number of Jacobi sweeps, which converge quadratically.
-    const SWEEPS: usize = 12;
-    let s = spread;
-    let (xx, yy, zz) = (s[(0, 0)], s[(1, 1)], s[(2, 2)]);
-    let (yz, zx, xy) = (s[(1, 2)] - s[(2, 1)], s[(2, 0)] - s[(0, 2)], s[(0, 1)] - s[(1, 0)]);
-    let (pyz, pzx, pxy) = (s[(1, 2)] + s[(2, 1)], s[(2, 0)] + s[(0, 2)], s[(0, 1)] + s[(1, 0)]);
-    let mut m = Matrix4::new(
-        xx + yy + zz + CALM * s.norm(),
-        yz,
-        zx,
-        xy,
-        yz,
-        xx - yy - zz,
-        pxy,
-        pzx,
-        zx,
-        pxy,
-        yy - xx - zz,
-        pyz,
-        xy,
-        pzx,
-        pyz,
-        zz - xx - yy,
-    );
-    let mut vectors = Matrix4::identity();
-    for _ in 0..SWEEPS {
-        for p in 0..3 {
-            for q in p + 1..4 {
-                if m[(p, q)] == 0.0 {
-                    continue;
-                }
-                let theta = (m[(q, q)] - m[(p, p)]) / (2.0 * m[(p, q)]);
-                let tangent = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-                let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
-                let sine = tangent * cosine;
-                for k in 0..4 {
-                    let (a, b) = (m[(k, p)], m[(k, q)]);
-                    (m[(k, p)], m[(k, q)]) = (cosine * a - sine * b, sine * a + cosine * b);
-                }
-                for k in 0..4 {
-                    let (a, b) = (m[(p, k)], m[(q, k)]);
-                    (m[(p, k)], m[(q, k)]) = (cosine * a - sine * b, sine * a + cosine * b);
-                }
-                for k in 0..4 {
-                    let (a, b) = (vectors[(k, p)], vectors[(k, q)]);
-                    (vectors[(k, p)], vectors[(k, q)]) = (cosine * a - sine * b, sine * a + cosine * b);
-                }
-            }
-        }
-    }
-    let best = (1..4).fold(0, |best, k| if m[(k, k)] > m[(best, best)] { k } else { best });
-    let quaternion: [f64; 4] = [0, 1, 2, 3].map(|k| vectors[(k, best)]);
-    if quaternion.iter().all(|x| x.is_finite()) { quaternion } else { [1.0, 0.0, 0.0, 0.0] }
 }

@@ -3,7 +3,7 @@
 use super::CollisionError;
 use super::motion::{Motion, ObstaclePose};
 use super::surface::{Moment, NONE, TriangleSurface};
-use super::swept::Elements;
+use numerics::swept::SweptElements;
 use numerics::tree::TriangleTree;
 use numerics::vector::{DVec3, Vec3};
 
@@ -13,8 +13,8 @@ pub struct Obstacle {
     pub(super) surface: TriangleSurface,
     pub(super) motion: Motion,
     /// Swept boxes of triangles and of sharp edges, and the indices of those edges.
-    pub(super) faces: Elements<3>,
-    pub(super) edges: Elements<2>,
+    pub(super) faces: SweptElements<3>,
+    pub(super) edges: SweptElements<2>,
     pub(super) sharp_edges: Vec<u32>,
     /// Points where the surface is not flat.
     pub(super) sharp_points: Vec<u32>,
@@ -65,8 +65,8 @@ impl Obstacle {
         sharp_points.dedup();
         let ends = sharp_edges.iter().map(|index| surface.edges[*index as usize].ends).collect();
         Ok(Self {
-            faces: Elements::new(surface.triangles.clone(), first),
-            edges: Elements::new(ends, first),
+            faces: SweptElements::new(surface.triangles.clone(), first),
+            edges: SweptElements::new(ends, first),
             solid: TriangleTree::build(&narrow(first), &surface.triangles),
             motion: Motion::new(poses),
             surface,

@@ -12,9 +12,10 @@
 //! Limit: bodies of which only edges cross, with no point of one inside the other, are not seen.
 
 use super::surface::{Moment, TriangleSurface};
-use super::{BodySkin, ClosestPoint, CollisionScene, Obstacle};
+use super::{BodySkin, CollisionScene, Obstacle};
 use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
 use crate::tets::{Enclosure, Exit, bounds};
+use numerics::closest_point::ClosestPoint;
 use numerics::tree::TriangleTree;
 use numerics::vector::{DVec3, to_f32};
 use serde::{Deserialize, Serialize};
@@ -24,6 +25,8 @@ const TOUCHING: f64 = 0.01;
 /// Distance in gaps below their surface at which its points are tested for overlap. In a corner of a box, which is tested
 /// along its diagonal, that is still deeper than a gap below each face.
 const BELOW: f64 = 2.0;
+/// Share of its height above the ground by which a body is squeezed against the ground, if that is the shortest way out.
+const SQUEEZED: f64 = 0.25;
 
 /// What a body overlaps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,6 +63,13 @@ pub struct Separation<'a> {
     pub over: u32,
     /// Length of the frame, seconds.
     pub seconds: f64,
+}
+
+/// The particles of a skin that are being pushed out of an obstacle.
+pub(super) struct Pushed {
+    pub(super) skin: usize,
+    pub(super) obstacle: usize,
+    pub(super) particles: Vec<u32>,
 }
 
 /// Where bodies are, relative to what should keep them out.
@@ -103,13 +113,18 @@ impl<'a> Side<'a> {
         inside
     }
 
-    /// Where those of its points that are inside the other leave it in a direction.
+    /// Where those of its points that are inside the other, or a little below the surface are, leave it in a direction.
     fn exits(&self, other: &Self, candidates: &[u32], direction: DVec3) -> Vec<Exit> {
         let mut exits = other.solid.exits(&self.below, candidates, direction);
         for exit in &mut exits {
             let [below, point] = [&self.below, self.points].map(|all| DVec3::from(all[exit.point as usize]));
             exit.distance = (exit.distance + direction.dot(&(below - point))).max(0.0);
         }
+        // Those that are inside by less than that.
+        let is_known = |point: &u32| exits.binary_search_by_key(point, |exit| exit.point).is_ok();
+        let others: Vec<u32> = candidates.iter().copied().filter(|point| !is_known(point)).collect();
+        exits.extend(other.solid.exits(self.points, &others, direction));
+        exits.sort_by_key(|exit| exit.point);
         exits
     }
 
@@ -173,7 +188,7 @@ impl CollisionScene<'_> {
                     let gaps = [obstacle.thickness; 2];
                     let side = Side::new(x, &own.touching, &own.surface, gaps);
                     let other = Side::new(points, &obstacle.surface.vertices, &obstacle.surface, gaps);
-                    let ways = Ways { up: self.ground.map(|ground| ground.up.into()), gap: obstacle.thickness };
+                    let ways = Ways { ground: self.room(own, x), gap: obstacle.thickness };
                     let [marked, _] = ways.add(skin, OverlapPartner::Obstacle(index), [&side, &other], &mut found);
                     mark(&marked);
                 }
@@ -181,13 +196,21 @@ impl CollisionScene<'_> {
             for (index, next) in self.skins.iter().enumerate().skip(skin + 1) {
                 if self.body_contact.is_some() && overlap(&boxes[skin], &boxes[index]) {
                     let [side, other] = [own, next].map(|of| Side::new(x, &of.touching, &of.surface, [thickness; 2]));
-                    let ways = Ways { up: None, gap: thickness };
+                    let ways = Ways { ground: None, gap: thickness };
                     let marked = ways.add(skin, OverlapPartner::Skin(index), [&side, &other], &mut found);
                     marked.iter().for_each(|marked| mark(marked));
                 }
             }
         }
         (found, inside.iter().filter(|inside| **inside).count())
+    }
+
+    /// The upward direction of the ground, and how far a skin may be pushed down towards it.
+    fn room(&self, skin: &BodySkin, x: &[[f64; 3]]) -> Option<(DVec3, f64)> {
+        let ground = self.ground?;
+        let up = DVec3::from(ground.up);
+        let heights = skin.touching.iter().map(|point| up.dot(&DVec3::from(x[*point as usize])) - ground.height);
+        Some((up, SQUEEZED * heights.fold(0.0, f64::max)))
     }
 
     fn below_ground(&self, skin: usize, x: &[[f64; 3]], found: &mut Vec<Overlap>, mark: &mut impl FnMut(&[bool])) {
@@ -223,16 +246,21 @@ impl CollisionScene<'_> {
         (allowed, if seconds > 0.0 { (depth - allowed) / seconds } else { 0.0 })
     }
 
-    /// Contacts of the pairs that are being pushed apart.
-    pub(super) fn separate(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
+    /// Contacts of the pairs that are being pushed apart; returns what is pushed out of obstacles.
+    pub(super) fn separate(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) -> Vec<Pushed> {
+        let mut pushed = Vec::new();
         let overlaps = self.separation.map_or(&[][..], |separation| separation.overlaps);
         for overlap in overlaps.iter().filter(|overlap| self.separating(overlap.skin, overlap.partner).is_some()) {
             match overlap.partner {
                 OverlapPartner::Ground => {}
-                OverlapPartner::Obstacle(index) => self.out_of_obstacle(query, overlap, &self.obstacles[index], out),
+                OverlapPartner::Obstacle(obstacle) => {
+                    let particles = self.out_of_obstacle(query, overlap, &self.obstacles[obstacle], out);
+                    pushed.push(Pushed { skin: overlap.skin, obstacle, particles });
+                }
                 OverlapPartner::Skin(index) => self.out_of_skin(query, overlap, &self.skins[index], out),
             }
         }
+        pushed
     }
 
     fn out_of_skin(&self, query: &ContactQuery<'_>, overlap: &Overlap, other: &BodySkin, out: &mut Vec<Contact>) {
@@ -246,7 +274,7 @@ impl CollisionScene<'_> {
                 let [u, v, w] = outer.weights(inner, &exit, normal);
                 let (allowed, speed) = self.allowed(overlap, exit.distance + params.thickness, query.times);
                 out.push(Contact {
-                    particles: [exit.point, a, b, c],
+                    points: [exit.point, a, b, c],
                     weights: [1.0, -u, -v, -w],
                     normal: normal.into(),
                     offset: -allowed,
@@ -259,17 +287,24 @@ impl CollisionScene<'_> {
         }
     }
 
-    fn out_of_obstacle(&self, query: &ContactQuery<'_>, overlap: &Overlap, other: &Obstacle, out: &mut Vec<Contact>) {
+    /// Returns the particles that are pushed.
+    fn out_of_obstacle(
+        &self,
+        query: &ContactQuery<'_>,
+        overlap: &Overlap,
+        other: &Obstacle,
+        out: &mut Vec<Contact>,
+    ) -> Vec<u32> {
         let first = &self.skins[overlap.skin];
         let normal = DVec3::from(overlap.direction);
         let [start, end] = query.times.map(|time| other.at(time));
-        let mut push = |exit: &Exit, (particles, weights): ([u32; 4], [f64; 4]), (points, shares): (&[u32], &[f64])| {
+        let mut push = |exit: &Exit, (own, weights): ([u32; 4], [f64; 4]), (points, shares): (&[u32], &[f64])| {
             let (allowed, speed) = self.allowed(overlap, exit.distance + other.thickness, query.times);
             let reached: DVec3 =
                 points.iter().zip(shares).map(|(point, share)| DVec3::from(end[*point as usize]) * *share).sum();
             let velocity = other.velocity_of(query.times[1], points, shares) + normal * speed;
             out.push(Contact {
-                particles,
+                points: own,
                 weights,
                 normal: normal.into(),
                 offset: normal.dot(&reached) - allowed,
@@ -282,37 +317,30 @@ impl CollisionScene<'_> {
         let gaps = [other.thickness, 0.0];
         let body = Side::new(query.from, &first.touching, &first.surface, gaps);
         let solid = Side::new(&start, &other.surface.vertices, &other.surface, gaps);
-        for exit in body.exits(&solid, body.candidates, normal) {
-            let shares = solid.weights(&body, &exit, normal);
+        let exits = body.exits(&solid, body.candidates, normal);
+        for exit in &exits {
+            let shares = solid.weights(&body, exit, normal);
             let corners = other.surface.triangles[exit.face as usize];
-            push(&exit, ([exit.point, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]), (&corners, &shares));
+            push(exit, ([exit.point, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]), (&corners, &shares));
         }
         for exit in solid.exits(&body, solid.candidates, -normal) {
             let [a, b, c] = first.surface.triangles[exit.face as usize];
             let [u, v, w] = body.weights(&solid, &exit, -normal);
             push(&exit, ([a, b, c, 0], [u, v, w, 0.0]), (&[exit.point], &[1.0]));
         }
+        exits.iter().map(|exit| exit.point).collect()
     }
 
-    /// Where particles at `x`, and more points of each skin, are at the end of the frame.
-    pub fn penetration(&self, x: &[[f64; 3]], more: &[Vec<[f64; 3]>]) -> Penetration {
+    /// Where contact points at `x` are at the end of the frame.
+    pub fn penetration(&self, x: &[[f64; 3]]) -> Penetration {
         let scene = CollisionScene { separation: None, ..*self };
         let mut contacts = Vec::new();
         scene.find(&ContactQuery { from: x, to: x, times: [1.0; 2] }, &mut contacts);
         let depths = contacts.iter().map(|contact| contact.depth(x));
         let mut found = Penetration { inside: 0, deepest: depths.fold(0.0, f64::max) };
-        // The points of each skin: its particles, then more.
-        let (mut points, mut is_particle, mut ranges) = (Vec::new(), Vec::new(), Vec::new());
-        for (index, skin) in self.skins.iter().enumerate() {
-            let first = points.len();
-            points.extend(skin.touching.iter().map(|particle| x[*particle as usize]));
-            is_particle.resize(points.len(), true);
-            points.extend(more.get(index).into_iter().flatten());
-            is_particle.resize(points.len(), false);
-            ranges.push((first..points.len(), bounds(points[first..].iter().copied())));
-        }
         if let Some(ground) = self.ground {
-            let heights = points.iter().map(|p| DVec3::from(*p).dot(&DVec3::from(ground.up)) - ground.height);
+            let points = self.skins.iter().flat_map(|skin| &skin.touching).map(|point| x[*point as usize]);
+            let heights = points.map(|p| DVec3::from(p).dot(&DVec3::from(ground.up)) - ground.height);
             found.deepest = heights.fold(found.deepest, |deepest, height| deepest.max(ground.thickness - height));
         }
         let ends: Vec<_> = self.obstacles.iter().map(|obstacle| obstacle.at(1.0)).collect();
@@ -324,15 +352,15 @@ impl CollisionScene<'_> {
         let skins = self.skins.iter().enumerate().filter_map(|(index, skin)| {
             Some((Some(index), SolidShape { surface: &skin.surface, at: x, gap: self.body_contact?.thickness }))
         });
-        let mut inside = vec![false; points.len()];
-        for (own, solid) in obstacles.chain(skins) {
+        let mut inside = vec![false; x.len()];
+        let boxes: Vec<_> = self.skins.iter().map(|skin| skin_bounds(skin, x)).collect();
+        for (own, solid) in obstacles.chain(skins).filter(|(_, solid)| solid.surface.closed) {
             let around = bounds(solid.surface.vertices.iter().map(|vertex| solid.at[*vertex as usize]));
-            let others = ranges.iter().enumerate().filter(|(skin, _)| Some(*skin) != own);
-            let near = others.filter(|(_, (_, own))| overlap(own, &around)).flat_map(|(_, (range, _))| range.clone());
-            // What contacts do not measure, and what may be inside.
-            let near = near.filter(|point| !is_particle[*point] || overlap(&[points[*point]; 2], &around));
-            let near: Vec<u32> = near.map(|point| point as u32).collect();
-            solid.depths(&points, &near, &is_particle, &mut inside, &mut found.deepest);
+            let others =
+                (0..).zip(self.skins).filter(|(skin, _)| Some(*skin) != own && overlap(&boxes[*skin], &around));
+            let near = others.flat_map(|(_, skin)| &skin.touching).copied();
+            let near: Vec<u32> = near.filter(|point| overlap(&[x[*point as usize]; 2], &around)).collect();
+            solid.depths(x, &near, &mut inside, &mut found.deepest);
         }
         found.inside = inside.iter().filter(|inside| **inside).count();
         found
@@ -348,34 +376,33 @@ struct SolidShape<'a> {
 
 impl SolidShape<'_> {
     /// Marks those of the `near` points that are `inside`, and raises `deepest` to the largest depth of one below the gap.
-    /// Particles outside are left to contacts, which know how near they are.
-    fn depths(&self, points: &[[f64; 3]], near: &[u32], is_particle: &[bool], inside: &mut [bool], deepest: &mut f64) {
-        let mut within = vec![false; points.len()];
-        if self.surface.closed && !near.is_empty() {
-            Enclosure::new(self.at, &self.surface.triangles, 0.0).mark(points, near, &mut within);
+    /// Points outside are left to contacts, which know how near they are.
+    fn depths(&self, points: &[[f64; 3]], near: &[u32], inside: &mut [bool], deepest: &mut f64) {
+        if near.is_empty() {
+            return;
         }
-        let measured = |point: &&u32| within[**point as usize] || !is_particle[**point as usize];
-        let measured: Vec<u32> = near.iter().filter(measured).copied().collect();
-        if measured.is_empty() {
+        let mut within = vec![false; points.len()];
+        Enclosure::new(self.at, &self.surface.triangles, 0.0).mark(points, near, &mut within);
+        let within: Vec<u32> = near.iter().filter(|point| within[**point as usize]).copied().collect();
+        if within.is_empty() {
             return;
         }
         let narrow = |p: &[f64; 3]| to_f32(DVec3::from(*p));
         let corners: Vec<_> = self.at.iter().map(narrow).collect();
         let tree = TriangleTree::build(&corners, &self.surface.triangles);
-        let from: Vec<_> = measured.iter().map(|point| narrow(&points[*point as usize])).collect();
-        for (point, closest) in measured.iter().zip(tree.closest_each(&from, f32::INFINITY)) {
+        let from: Vec<_> = within.iter().map(|point| narrow(&points[*point as usize])).collect();
+        for (point, closest) in within.iter().zip(tree.closest_each(&from, f32::INFINITY)) {
             let Some(distance) = closest.map(|closest| f64::from(closest.distance)) else { continue };
-            let is_within = within[*point as usize];
-            inside[*point as usize] |= is_within && distance > TOUCHING * self.gap;
-            *deepest = deepest.max(self.gap + if is_within { distance } else { -distance });
+            inside[*point as usize] |= distance > TOUCHING * self.gap;
+            *deepest = deepest.max(self.gap + distance);
         }
     }
 }
 
 /// The ways in which a body may leave what it overlaps.
 struct Ways {
-    /// The upward direction of the ground, below which it is not pushed.
-    up: Option<DVec3>,
+    /// The upward direction of the ground, and how far it may be pushed down.
+    ground: Option<(DVec3, f64)>,
     gap: f64,
 }
 
@@ -402,14 +429,16 @@ impl Ways {
             DVec3::new(axis(k), axis(k / 3), axis(k / 9))
         });
         let directions = std::iter::once(shrinks).chain(lattice).filter_map(|direction| direction.try_normalize(0.0));
-        let allowed = directions.filter(|direction| self.up.is_none_or(|up| direction.dot(&up) > -1e-9));
+        let is_allowed = |direction: DVec3, depth: f64| {
+            self.ground.is_none_or(|(up, room)| direction.dot(&up) > -1e-9 || -direction.dot(&up) * depth <= room)
+        };
         let (mut depth, mut shortest) = (f64::INFINITY, None);
-        for direction in allowed {
+        for direction in directions {
             let (out, past) = (side.exits(other, &own, direction), other.exits(side, &others, -direction));
             let points = out.iter().chain(&past).map(|exit| exit.distance).fold(0.0, f64::max);
-            if points < depth {
+            if points < depth && is_allowed(direction, points + self.gap) {
                 let lines = side.way_out(other, direction, self.gap).max(other.way_out(side, -direction, self.gap));
-                if points.max(lines) < depth {
+                if points.max(lines) < depth && is_allowed(direction, points.max(lines) + self.gap) {
                     (depth, shortest) = (points.max(lines), Some(direction));
                 }
             }

@@ -2,10 +2,10 @@
 
 use super::body_skin::BodySkin;
 use super::edge;
-use super::swept::{self, BoxTree};
 use super::vertex::{self, ContactRules, MovingSurface};
 use super::{CollisionScene, OverlapPartner, REACH, collect_in_order};
 use crate::mass_spring::{Contact, ContactQuery};
+use numerics::swept::{self, SweptBoxTree};
 use numerics::tree::Cuboid;
 use numerics::vector::DVec3;
 
@@ -18,7 +18,7 @@ pub struct ContactParams {
     pub friction: f64,
 }
 
-/// Elements nearer than this fraction of the gap at rest are considered joined.
+/// SweptElements nearer than this fraction of the gap at rest are considered joined.
 const JOINED: f64 = 1e-6;
 
 /// Two moving skins, or one with itself.
@@ -34,7 +34,7 @@ struct Pair<'a> {
     rules: ContactRules,
 }
 
-/// Marks the neighbourhood of some particles, by the number of the query that marked them last.
+/// Marks the neighbourhood of some points, by the number of the query that marked them last.
 #[derive(Default)]
 struct Marks {
     of: Vec<u32>,
@@ -53,8 +53,11 @@ impl Marks {
         }
     }
 
-    fn have(&self, particles: &[u32]) -> bool {
-        particles.iter().any(|particle| self.of[*particle as usize] == self.last)
+    fn have(&self, skin: &BodySkin, points: &[u32]) -> bool {
+        let marked = |point: &u32| self.of[*point as usize] == self.last;
+        points
+            .iter()
+            .any(|point| if skin.rides(*point) { skin.around(*point).iter().any(marked) } else { marked(point) })
     }
 }
 
@@ -62,8 +65,8 @@ impl Marks {
 struct Boxes<'a> {
     /// Bounds of all its particles.
     bounds: Cuboid,
-    faces: BoxTree<'a>,
-    edges: BoxTree<'a>,
+    faces: SweptBoxTree<'a>,
+    edges: SweptBoxTree<'a>,
 }
 
 impl CollisionScene<'_> {
@@ -121,7 +124,7 @@ impl Pair<'_> {
                 boxes.faces.overlapping(&self.points[*particle as usize], &mut faces);
                 if self.self_contact {
                     marks.put(first, &[*particle]);
-                    faces.retain(|face| !marks.have(&first.surface.triangles[*face as usize]));
+                    faces.retain(|face| !marks.have(first, &first.surface.triangles[*face as usize]));
                 }
                 if faces.is_empty() {
                     continue;
@@ -154,7 +157,9 @@ impl Pair<'_> {
                 boxes.edges.overlapping(&swept::bounds_of(&edge.ends, self.points), &mut others);
                 if self.self_contact {
                     marks.put(first, &edge.ends);
-                    others.retain(|other| *other > *index && !marks.have(&first.surface.edges[*other as usize].ends));
+                    others.retain(|other| {
+                        *other > *index && !marks.have(first, &first.surface.edges[*other as usize].ends)
+                    });
                 }
                 for other_index in &others {
                     let other = &second.surface.edges[*other_index as usize];
@@ -175,18 +180,18 @@ impl Pair<'_> {
         if self.self_contact { self.params.thickness.min(at_rest()) } else { self.params.thickness }
     }
 
-    fn contact(&self, particles: [u32; 4], weights: [f64; 4], normal: DVec3, shift: f64, gap: f64) -> Option<Contact> {
+    fn contact(&self, points: [u32; 4], weights: [f64; 4], normal: DVec3, shift: f64, gap: f64) -> Option<Contact> {
         if gap < JOINED * self.params.thickness {
             return None;
         }
         Some(Contact {
-            particles,
+            points,
             weights,
             normal: normal.into(),
             offset: -shift,
             gap,
             velocity: [0.0; 3],
-            friction: self.params.friction * self.scene.friction_scale(&particles, &weights),
+            friction: self.params.friction * self.scene.friction_scale(&points, &weights),
             jammed: false,
         })
     }

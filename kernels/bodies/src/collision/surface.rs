@@ -3,7 +3,7 @@
 //! Positions are passed to each call, so that one surface serves all poses. An edge with more than two triangles
 //! keeps the first two.
 
-use super::closest_point::ClosestPoint;
+use numerics::closest_point::{ClosestPoint, TriangleFeature};
 use numerics::vector::DVec3;
 
 /// No triangle.
@@ -150,12 +150,12 @@ impl TriangleSurface {
         let corners = self.triangles[nearest.face as usize];
         let normal = |face: u32| if face == NONE { DVec3::zeros() } else { self.normal(at, face).unwrap_or_default() };
         match nearest.feature() {
-            Feature::Inside => normal(nearest.face),
-            Feature::Side(k) => match self.edges.get(self.sides[nearest.face as usize][(k + 1) % 3] as usize) {
+            TriangleFeature::Inside => normal(nearest.face),
+            TriangleFeature::Side(k) => match self.edges.get(self.sides[nearest.face as usize][(k + 1) % 3] as usize) {
                 Some(edge) => normal(edge.faces[0]) + normal(edge.faces[1]),
                 None => DVec3::zeros(),
             },
-            Feature::Corner(k) => {
+            TriangleFeature::Corner(k) => {
                 let here = at.position(corners[k]);
                 let mut sum = DVec3::zeros();
                 for edge in self.edges_at(corners[k]) {
@@ -182,12 +182,12 @@ impl TriangleSurface {
             away.dot(&direction) <= SLACK * length * direction.norm()
         };
         match nearest.feature() {
-            Feature::Inside => true,
-            Feature::Side(k) => {
+            TriangleFeature::Inside => true,
+            TriangleFeature::Side(k) => {
                 let edge = self.edges.get(self.sides[nearest.face as usize][(k + 1) % 3] as usize);
                 edge.is_none_or(|edge| edge.opposite.into_iter().all(|third| third == NONE || behind(third)))
             }
-            Feature::Corner(k) => {
+            TriangleFeature::Corner(k) => {
                 self.edges_at(corners[k]).all(|edge| edge.ends.into_iter().all(|end| end == corners[k] || behind(end)))
             }
         }
@@ -204,7 +204,7 @@ impl TriangleSurface {
         let mut normal = self.normal(at, face);
         for _ in 0..MOST {
             let Some(here) = normal else { break };
-            let weights = super::closest_point::projected(point, self.corners(at, face), here);
+            let weights = numerics::closest_point::projected(point, self.corners(at, face), here);
             let mut sides = [0, 1, 2];
             sides.sort_by(|a, b| weights[*a].total_cmp(&weights[*b]));
             let outside = sides.into_iter().filter(|k| weights[*k] < 0.0);
@@ -224,15 +224,4 @@ impl TriangleSurface {
 pub(super) struct Settled {
     pub(super) nearest: ClosestPoint,
     pub(super) normal: Option<DVec3>,
-}
-
-/// Part of a triangle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Feature {
-    /// Its interior.
-    Inside,
-    /// The side opposite to this corner.
-    Side(usize),
-    /// This corner.
-    Corner(usize),
 }

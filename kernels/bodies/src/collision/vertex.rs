@@ -3,9 +3,9 @@
 //! The side that the point came from decides. A closed surface can only be entered from outside; an open one has
 //! two sides. After the first crossing only that triangle counts; other triangles are judged at that time.
 
-use super::closest_point::ClosestPoint;
-use super::coplanarity::{Separation, face_separation, sign_changes};
 use super::surface::{Moment, Positions, Settled, TriangleSurface};
+use numerics::closest_point::ClosestPoint;
+use numerics::coplanarity::{MotionSeparation, face_separation, sign_changes};
 use numerics::vector::DVec3;
 
 /// Distance from a triangle's plane at which a point lies on it, relative to the lengths involved: above rounding.
@@ -188,8 +188,8 @@ fn crossing(path: &[DVec3], on: &MovingSurface<'_>, face: u32, reach: f64) -> Ap
     for piece in 0..path.len() - 1 {
         let end = configuration(piece + 1);
         let apart = face_separation(&start, &end, reach);
-        far &= apart == Separation::Far;
-        if apart == Separation::Unknown {
+        far &= apart == MotionSeparation::Far;
+        if apart == MotionSeparation::Unknown {
             for (t, above) in sign_changes(&start, &end).iter().filter(|root| root.1 || !on.surface.closed) {
                 let [b, c, p] = [0, 1, 2].map(|k| start[k].lerp(&end[k], t));
                 let size = b.norm().max(c.norm()).max(start[2].norm()).max(end[2].norm());

@@ -1,5 +1,7 @@
 //! Connected components of a body.
 
+use numerics::pieces::pieces;
+
 /// Connected components, numbered by their lowest points.
 pub(super) struct ConnectedPieces {
     pub(super) count: usize,
@@ -9,33 +11,17 @@ pub(super) struct ConnectedPieces {
 
 impl ConnectedPieces {
     pub(super) fn of(points: usize, tets: &[[u32; 4]]) -> Self {
-        // Union-find: each entry leads to a lower point of the component, that of the lowest to itself.
-        let mut towards: Vec<u32> = (0..points as u32).collect();
-        for [a, rest @ ..] in tets {
-            for b in rest {
-                let (a, b) = (first(&mut towards, *a), first(&mut towards, *b));
-                towards[a.max(b) as usize] = a.min(b);
-            }
-        }
+        let links = tets.iter().flat_map(|[first, others @ ..]| others.map(|other| [*first, other]));
+        let lowest = pieces(points, links);
         let mut count = 0;
         let mut of_point = vec![0; points];
         for point in 0..points {
-            let first = first(&mut towards, point as u32) as usize;
+            let first = lowest[point] as usize;
             of_point[point] = if first == point { count } else { of_point[first] };
             count += u32::from(first == point);
         }
         Self { count: count as usize, of_point }
     }
-}
-
-/// The lowest point of a component; halves the path.
-fn first(towards: &mut [u32], mut point: u32) -> u32 {
-    while towards[point as usize] != point {
-        let next = towards[towards[point as usize] as usize];
-        towards[point as usize] = next;
-        point = next;
-    }
-    point
 }
 
 #[cfg(test)]

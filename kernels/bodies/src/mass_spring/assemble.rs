@@ -1,11 +1,11 @@
 //! Forces, residual and linear system of a stage at given positions.
 
 use super::contact::ContactMode;
-use super::partition::{Partition, RaggedSlice};
-use super::rank_one::RankOneTerms;
 use super::springs::{self, Sums};
 use super::stage::{FrameContext, Stage, StageSolver};
 use super::system::{smoother, solve_lower};
+use numerics::partition::{Partition, RaggedSlice};
+use numerics::rank_one::RankOneTerms;
 use numerics::vector::DVec3;
 
 /// Factor on the regions' contribution to a particle's own diagonal block. The block smoother then accounts for part

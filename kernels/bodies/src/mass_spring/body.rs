@@ -9,12 +9,13 @@
 //! inverted at rest is treated as its mirror image, and a flat one has no volume to preserve. Metres, seconds,
 //! kilograms.
 
-use super::adjacency::Adjacency;
-use super::particle_order::Order;
-use super::partition::Partition;
 use super::regions::Regions;
 use super::tet_springs::{EDGES, edges, neighbours_of_missing};
+use crate::embedding::{EmbeddedPoint, with_riding};
+use numerics::adjacency::Adjacency;
+use numerics::cluster_order::ClusterOrder;
 use numerics::masked::Masked;
+use numerics::partition::Partition;
 use numerics::vector::DVec3;
 
 /// Shortest length used in k = E·ΣV/L², as a fraction of the mean length: bounds k at duplicate points to 1e6 times
@@ -49,6 +50,8 @@ pub struct Mesh<'a> {
     /// Surface edges that no tetrahedron has. They become springs with the mean E·ΣV of the surface edges at their
     /// ends.
     pub missing: &'a [[u32; 2]],
+    /// Points that ride along on particles, by which bodies may meet things: contact points count on from the particles.
+    pub riding: &'a [EmbeddedPoint],
 }
 
 /// Material parameters.
@@ -81,10 +84,10 @@ pub enum BodyError {
     /// A coordinate is NaN or infinite.
     #[error("point {0} is not finite")]
     Point(usize),
-    /// A tetrahedron or spring has a particle index out of range, or the same one twice.
+    /// A tetrahedron, spring or riding point has a particle index out of range, or one of the first two a particle twice.
     #[error("{what} {index} joins particles {particles:?}; expected distinct indices below {count}")]
     Particles {
-        /// `tetrahedron` or `spring`.
+        /// `tetrahedron`, `spring` or `riding point`.
         what: &'static str,
         /// Index of that element.
         index: usize,
@@ -111,7 +114,7 @@ pub enum BodyError {
 /// Particles, springs and tetrahedra in the solver's order.
 #[derive(Clone, Debug)]
 pub struct SoftBody {
-    pub(super) order: Order,
+    pub(super) order: ClusterOrder,
     /// Rest positions, in the solver's order.
     pub(super) rest: Vec<DVec3>,
     pub(super) mass: Vec<f64>,
@@ -140,6 +143,8 @@ pub struct SoftBody {
     mesh_spring_count: usize,
     /// For each missing edge, the surface edges whose mean stiffness it takes.
     means: Vec<Vec<u32>>,
+    /// Points that ride along, by the caller's indices.
+    pub(super) riding: Vec<EmbeddedPoint>,
     /// Longest side of the bounding box at rest, metres.
     pub(super) size: f64,
     /// Mean rest length of the springs, metres.
@@ -261,6 +266,22 @@ impl SoftBody {
         clusters.range(piece.start).start..clusters.range(piece.end - 1).end
     }
 
+    /// Number of contact points: particles and points that ride along.
+    pub(super) fn contact_point_count(&self) -> usize {
+        self.len() + self.riding.len()
+    }
+
+    /// The index of each of the caller's contact points: the solver's of particles, the same of those that ride along.
+    pub(super) fn contact_indices(&self) -> impl Iterator<Item = usize> {
+        self.order.index_of.iter().map(|particle| *particle as usize).chain(self.len()..self.contact_point_count())
+    }
+
+    /// The caller's contact points with particles at `x`.
+    pub(super) fn contact_points(&self, x: &[DVec3]) -> Vec<[f64; 3]> {
+        let particles = self.order.index_of.iter().map(|particle| x[*particle as usize].into()).collect();
+        with_riding(particles, &self.riding)
+    }
+
     /// Permutes per-particle values from the caller's to the solver's order.
     pub(super) fn to_solver_order<T: Copy>(&self, values: &[T]) -> Vec<T> {
         self.order.caller_of.iter().map(|caller| values[*caller as usize]).collect()
@@ -323,6 +344,17 @@ impl SoftBody {
         }
         mesh.tets.iter().enumerate().try_for_each(|(index, tet)| distinct("tetrahedron", index, tet, count))?;
         mesh.missing.iter().enumerate().try_for_each(|(index, ends)| distinct("spring", index, ends, count))?;
+        for (index, carrier) in mesh.riding.iter().enumerate() {
+            if carrier.particles.iter().any(|particle| *particle as usize >= count) {
+                return Err(BodyError::Particles {
+                    what: "riding point",
+                    index,
+                    particles: carrier.particles.to_vec(),
+                    count,
+                });
+            }
+            carrier.weights.iter().try_for_each(|weight| number("weight", index, weight.abs()).map(|_| ()))?;
+        }
         for (index, spring) in joints.iter().enumerate() {
             distinct("spring", index, &spring.ends, count)?;
             stiffness(index, spring.stiffness)?;
@@ -335,7 +367,7 @@ impl SoftBody {
         ends.extend(mesh.missing);
         let mesh_spring_count = ends.len();
         ends.extend(joints.iter().map(|spring| spring.ends));
-        let order = Order::new(&points, ends.iter().copied());
+        let order = ClusterOrder::new(&points, ends.iter().copied());
 
         let length = |ends: &[u32; 2]| (points[ends[0] as usize] - points[ends[1] as usize]).norm();
         let lengths: Vec<f64> =
@@ -380,6 +412,7 @@ impl SoftBody {
             given,
             kept,
             means,
+            riding: mesh.riding.to_vec(),
             mesh_spring_count,
             spacing,
         })
@@ -413,7 +446,7 @@ fn distinct(what: &'static str, index: usize, particles: &[u32], count: usize) -
 }
 
 /// Tetrahedra with a volume to preserve: their indices in the mesh, and their corners in the solver's order.
-fn with_volume(mesh: &Mesh<'_>, points: &[DVec3], order: &Order) -> (Vec<u32>, Vec<[u32; 4]>) {
+fn with_volume(mesh: &Mesh<'_>, points: &[DVec3], order: &ClusterOrder) -> (Vec<u32>, Vec<[u32; 4]>) {
     let keep = |(index, tet): (usize, &[u32; 4])| {
         let corners = tet.map(|corner| points[corner as usize]);
         let signed = volume(corners);

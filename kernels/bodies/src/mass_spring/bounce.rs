@@ -54,17 +54,16 @@ impl Touch {
             if depth.is_nan() || depth <= 0.0 {
                 continue;
             }
-            let side = |first: bool| contact.sides().find(move |side| (side.1 > 0.0) == first);
-            let Some((first, _)) = side(true) else { continue };
-            let second = side(false).map_or(OBSTACLES, |side| piece_of(side.0));
-            let pieces = [piece_of(first), second];
+            let [first, second] = contact.surfaces().map(|particles| particles.first());
+            let Some(first) = first else { continue };
+            let pieces = [piece_of(*first as usize), second.map_or(OBSTACLES, |second| piece_of(*second as usize))];
             if pieces[0] == pieces[1] {
                 continue;
             }
             let turned = pieces[0] > pieces[1];
             let key = if turned { [pieces[1], pieces[0]] } else { pieces };
-            let positive = contact.sides().filter(|side| side.1 > 0.0);
-            let point: DVec3 = positive.map(|(particle, weight)| x[particle] * weight).sum();
+            let of_first = contact.sides().take(contact.surfaces()[0].len());
+            let point: DVec3 = of_first.map(|(particle, weight)| x[particle] * weight).sum();
             let sum = sums.entry(key).or_default();
             sum[0] += contact.normal * if turned { -depth } else { depth };
             sum[1] += point * depth;

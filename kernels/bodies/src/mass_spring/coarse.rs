@@ -6,8 +6,8 @@
 
 use super::body::SoftBody;
 use super::galerkin::envelope;
-use super::partition::Partition;
 use super::system::{System, solve_lower, solve_lower_transpose, times};
+use numerics::partition::Partition;
 use numerics::vector::{DMat3, DVec3, Vec3, to_f32};
 use serde::{Deserialize, Serialize};
 

@@ -5,10 +5,10 @@
 //! Sums run by cluster in a fixed order, so bits do not depend on the number of threads.
 
 use super::body::SoftBody;
-use super::cholesky::Lower;
 use super::coarse::{ContactFilters, moved};
 use super::state::CachedCoarseFactor;
 use super::system::{System, solve_lower, solve_lower_transpose};
+use numerics::cholesky::EnvelopeMatrix;
 use numerics::simd::Path;
 use numerics::vector::{DVec3, Vec3, to_f64};
 
@@ -47,7 +47,7 @@ pub(super) struct Scratch {
 /// The coarse level of the preconditioner; the fine one is `system.smoother`.
 #[derive(Clone, Copy)]
 pub(super) struct Coarse<'a> {
-    factor: &'a Lower,
+    factor: &'a EnvelopeMatrix,
     offset_from_centroid: &'a [Vec3],
     filters: &'a ContactFilters,
 }
@@ -60,7 +60,7 @@ impl<'a> Coarse<'a> {
     /// Solves for the rigid motions `modes` of the clusters under `forces`; returns forcesᵀ·(PᵀAP)⁻¹·forces.
     fn solve(&self, forces: &[[f64; 6]], modes: &mut Vec<f64>) -> f64 {
         modes.clear();
-        if self.factor.len() == 0 {
+        if self.factor.is_empty() {
             return 0.0;
         }
         modes.extend(forces.iter().flatten());

@@ -9,7 +9,7 @@
 //! Limit: within a stage the surfaces of a contact are planes.
 
 use super::body::SoftBody;
-use super::rank_one::add_square;
+use numerics::rank_one::add_square;
 use numerics::vector::DVec3;
 
 /// Penalty stiffness κ ÷ effective stiffness of the particles, springs and inertia together. Larger values keep the
@@ -38,8 +38,8 @@ const CREEP: f64 = 2e-5;
 /// Two surfaces that may touch. With u = Σ wᵢxᵢ, n·u − offset is the distance of the first from the second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact {
-    /// The particles involved; entries of weight 0 are unused.
-    pub particles: [u32; 4],
+    /// The contact points involved, those of the first surface first; entries of weight 0 are unused.
+    pub points: [u32; 4],
     /// Vertex against obstacle: 1. Vertex against face: 1 and minus the barycentric weights. Edge against edge:
     /// weights along both, negative on the second.
     pub weights: [f64; 4],
@@ -58,18 +58,19 @@ pub struct Contact {
 }
 
 impl Contact {
-    /// Depth below its gap with particles at `x`, by the caller's indices, metres; negative above it.
+    /// Depth below its gap with contact points at `x`, metres; negative above it.
     pub(crate) fn depth(&self, x: &[[f64; 3]]) -> f64 {
-        let sides = self.particles.iter().zip(self.weights).filter(|side| side.1 != 0.0);
+        let sides = self.points.iter().zip(self.weights).filter(|side| side.1 != 0.0);
         let at: DVec3 = sides.map(|(particle, weight)| DVec3::from(x[*particle as usize]) * weight).sum();
         self.gap + self.offset - DVec3::from(self.normal).dot(&at)
     }
 }
 
-/// A motion for which potential contacts are wanted: particles move linearly from `from` to `to`.
+/// A motion for which potential contacts are wanted: contact points move linearly from `from` to `to`. Contact points are
+/// the particles, by the caller's indices, and after them the points that ride along ([`super::Mesh::riding`]).
 #[derive(Clone, Copy, Debug)]
 pub struct ContactQuery<'a> {
-    /// Positions at the first of `times`, by the caller's indices, metres.
+    /// Positions at the first of `times`, metres.
     pub from: &'a [[f64; 3]],
     /// Expected positions at the second; contact planes hold for that time.
     pub to: &'a [[f64; 3]],
@@ -84,11 +85,20 @@ pub trait ContactFinder: Sync {
     fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>);
 }
 
+/// The most particles of a contact: each of its points may ride along on four.
+const MOST_PARTICLES: usize = 16;
+
 /// A contact as the solver treats it, with particles in the solver's order.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContactConstraint {
-    pub(super) particles: [u32; 4],
-    pub(super) weights: [f64; 4],
+    /// The contact points involved; those that ride along count on from the particles.
+    pub(super) points: [u32; 4],
+    pub(super) point_weights: [f64; 4],
+    /// The particles that these depend on, each once, and their weights; and how many there are, in all and of the first
+    /// surface.
+    particles: [u32; MOST_PARTICLES],
+    weights: [f64; MOST_PARTICLES],
+    counts: [usize; 2],
     pub(super) normal: DVec3,
     offset: f64,
     gap: f64,
@@ -150,8 +160,11 @@ impl ContactConstraint {
             return None;
         }
         let mut constraint = Self {
-            particles: [0; 4],
-            weights: contact.weights,
+            points: [0; 4],
+            point_weights: contact.weights,
+            particles: [0; MOST_PARTICLES],
+            weights: [0.0; MOST_PARTICLES],
+            counts: [0; 2],
             normal,
             offset: contact.offset,
             gap: contact.gap.max(0.0),
@@ -164,30 +177,78 @@ impl ContactConstraint {
             allowed_depth: 0.0,
             frozen: None,
         };
-        let mut yielding = 0.0;
         for k in 0..4 {
             if contact.weights[k] != 0.0 {
-                let particle = *body.order.index_of.get(contact.particles[k] as usize)?;
-                constraint.particles[k] = particle;
-                let stiff = 4.0 * body.mass[particle as usize] / (seconds * seconds)
-                    + particle_stiffness[particle as usize] / 3.0;
-                yielding += contact.weights[k] * contact.weights[k] / stiff;
+                constraint.add_point(body, k, contact.points[k] as usize)?;
             }
         }
+        let yielding = constraint.sides().fold(0.0, |sum, (particle, weight)| {
+            let stiff = 4.0 * body.mass[particle] / (seconds * seconds) + particle_stiffness[particle] / 3.0;
+            sum + weight * weight / stiff
+        });
         constraint.penalty_stiffness = PENALTY_RATIO / yielding;
         constraint.stick_limit = STICK_RATIO * constraint.penalty_stiffness * seconds;
         (yielding > 0.0 && constraint.penalty_stiffness.is_finite()).then_some(constraint)
     }
 
+    /// Adds a contact point of the caller's: a particle, or the particles that it rides along on.
+    fn add_point(&mut self, body: &SoftBody, k: usize, point: usize) -> Option<()> {
+        let weight = self.point_weights[k];
+        match body.order.index_of.get(point) {
+            Some(particle) => {
+                self.points[k] = *particle;
+                self.add_side(*particle, weight);
+            }
+            None => {
+                self.points[k] = point as u32;
+                let carrier = body.riding.get(point - body.len())?;
+                for (particle, share) in carrier.sides() {
+                    self.add_side(body.order.index_of[particle as usize], weight * share);
+                }
+            }
+        }
+        if weight > 0.0 {
+            self.counts[1] = self.counts[0];
+        }
+        Some(())
+    }
+
+    fn add_side(&mut self, particle: u32, weight: f64) {
+        let count = &mut self.counts[0];
+        match self.particles[..*count].iter().position(|known| *known == particle) {
+            Some(known) => self.weights[known] += weight,
+            None => {
+                (self.particles[*count], self.weights[*count]) = (particle, weight);
+                *count += 1;
+            }
+        }
+    }
+
     /// The particles with their weights.
     pub(super) fn sides(&self) -> impl Iterator<Item = (usize, f64)> {
-        let sides: [(usize, f64); 4] = std::array::from_fn(|k| (self.particles[k] as usize, self.weights[k]));
-        sides.into_iter().filter(|(_, weight)| *weight != 0.0)
+        let count = self.counts[0];
+        self.particles[..count].iter().zip(&self.weights).map(|(particle, weight)| (*particle as usize, *weight))
+    }
+
+    /// The first of its particles.
+    pub(super) fn first_particle(&self) -> usize {
+        self.particles[0] as usize
+    }
+
+    /// The particles of the first surface, and of the second if that is a body's.
+    pub(super) fn surfaces(&self) -> [&[u32]; 2] {
+        self.particles[..self.counts[0]].split_at(self.counts[1]).into()
+    }
+
+    /// The contact points with their weights.
+    pub(super) fn points(&self) -> impl Iterator<Item = (usize, f64)> {
+        let points: [(usize, f64); 4] = std::array::from_fn(|k| (self.points[k] as usize, self.point_weights[k]));
+        points.into_iter().filter(|(_, weight)| *weight != 0.0)
     }
 
     /// Whether it is between bodies: the sum of its weights is 0 there, and 1 with an obstacle.
     pub(super) fn is_two_sided(&self) -> bool {
-        self.weights.iter().sum::<f64>().abs() < 0.5
+        self.point_weights.iter().sum::<f64>().abs() < 0.5
     }
 
     /// Whether slip is resisted.
@@ -228,8 +289,19 @@ impl ContactConstraint {
 
     /// The particle and its weight, if the contact involves only one.
     pub(super) fn single_particle(&self) -> Option<(usize, f64)> {
-        let mut sides = self.sides();
-        sides.next().filter(|_| sides.next().is_none())
+        self.sides().next().filter(|_| self.counts[0] == 1)
+    }
+
+    /// Whether it is that of a single point of a body.
+    pub(super) fn is_of_one_point(&self) -> bool {
+        self.point_weights.iter().filter(|weight| **weight != 0.0).count() == 1
+    }
+
+    /// Moves those of its particles that are not `held` so that their weighted sum moves by `distance` along the normal.
+    pub(super) fn shift(&self, distance: f64, held: &[bool], x: &mut [DVec3]) {
+        let free = || self.sides().filter(|side| !held[side.0]);
+        let square: f64 = free().map(|(_, weight)| weight * weight).sum();
+        free().for_each(|(particle, weight)| x[particle] += self.normal * (distance * weight / square));
     }
 
     /// Σ wᵢ·valuesᵢ.
@@ -328,13 +400,13 @@ impl ContactConstraint {
     /// Fixes the normal load of friction: the force at `x`, `seconds` before the detection time, but no more than the
     /// last step's `loads`. With a given load friction has a potential and the stage stays a convex minimisation. A
     /// new contact has no load yet. Where an obstacle moves so far that its plane at that time is unknown, a contact
-    /// of a single particle takes the last load.
+    /// of a single point takes the last load.
     pub(super) fn with_load(&self, x: &[DVec3], loads: &[f64], seconds: f64) -> Self {
         let near = self.velocity.norm() * seconds <= self.gap;
-        let last = self.sides().map(|(particle, _)| loads[particle]).fold(0.0, f64::max);
+        let last = self.points().map(|(point, _)| loads[point]).fold(0.0, f64::max);
         let now = if near {
             self.load_at_depth(self.depth(x, seconds))
-        } else if self.single_particle().is_some() {
+        } else if self.is_of_one_point() {
             last
         } else {
             0.0

@@ -24,32 +24,30 @@ impl Stepper<'_> {
         let h = (times[1] - times[0]) * self.seconds;
         let Some(contacts) = self.frame.contacts else { return Vec::new() };
         let body = self.context.body;
-        let outwards = |x: &[DVec3]| -> Vec<[f64; 3]> {
-            body.order.index_of.iter().map(|particle| x[*particle as usize].into()).collect()
-        };
         let mut found: Vec<Contact> = Vec::new();
-        contacts.find(&ContactQuery { from: &outwards(&start.x), to: &outwards(to), times }, &mut found);
+        let [from, to] = [&start.x, to].map(|x| body.contact_points(x));
+        contacts.find(&ContactQuery { from: &from, to: &to, times }, &mut found);
         let known = found
             .iter()
             .filter_map(|contact| ContactConstraint::new(body, contact, self.seconds, &self.solver.particle_stiffness));
         let displacement = body.spacing * h / self.seconds;
         let known = known.map(|c| c.depenetrating(&start.x, h, displacement).with_load(&start.x, &start.loads, h));
         let mut known: Vec<ContactConstraint> = known.collect();
-        // Contacts of the same particles share the last loads.
+        // Contacts of the same points share the last loads.
         let asked = self.loads(&known, |contact| contact.load);
         for contact in known.iter_mut().filter(|contact| contact.load > 0.0) {
-            let shares = contact.sides().map(|(particle, _)| start.loads[particle] / asked[particle]);
+            let shares = contact.points().map(|(point, _)| start.loads[point] / asked[point]);
             contact.load *= shares.fold(1.0, f64::min);
         }
         known
     }
 
-    /// The sum over contacts of loads on each particle.
+    /// The sum over contacts of loads on each contact point.
     pub(super) fn loads(&self, contacts: &[ContactConstraint], of: impl Fn(&ContactConstraint) -> f64) -> Vec<f64> {
-        let mut loads = vec![0.0; self.context.body.len()];
+        let mut loads = vec![0.0; self.context.body.contact_point_count()];
         for contact in contacts {
             let load = of(contact);
-            contact.sides().for_each(|(particle, weight)| loads[particle] += weight.abs() * load);
+            contact.points().for_each(|(point, weight)| loads[point] += weight.abs() * load);
         }
         loads
     }
@@ -155,29 +153,28 @@ impl Stepper<'_> {
     /// The predicted positions `y`, moved so that contacts stay as deep as at `x` or just touch: friction acts on
     /// slip, so the initial guess should not contain normal motion.
     fn slid(&self, x: &[DVec3], y: &[DVec3], contacts: &[ContactConstraint], h: f64) -> Vec<DVec3> {
-        let mut out = y.to_vec();
-        for contact in contacts {
-            let Some((particle, weight)) = contact.single_particle() else { continue };
+        let (mut out, held) = (y.to_vec(), &self.context.external.held);
+        for contact in contacts.iter().filter(|contact| contact.is_of_one_point()) {
             let before = contact.clearance(x, h);
             let missing = before.min(0.0) - contact.clearance(&out, 0.0);
             if (missing > 0.0 || before < 0.0) && missing.abs() < MOST_NUDGE * self.context.body.spacing {
-                out[particle] += contact.normal * (missing / weight);
+                contact.shift(missing, held, &mut out);
             }
         }
         out
     }
 }
 
-/// Transfers the loads of `known` contacts to newly detected ones of the same particles with a similar normal.
+/// Transfers the loads of `known` contacts to newly detected ones of the same points with a similar normal.
 fn take_loads(known: &[ContactConstraint], found: &mut [ContactConstraint]) {
     /// Cosine of the largest angle between similar normals.
     const SAME: f64 = 0.9;
     let mut order: Vec<u32> = (0..known.len() as u32).collect();
-    order.sort_by_key(|index| (known[*index as usize].particles, *index));
+    order.sort_by_key(|index| (known[*index as usize].points, *index));
     for contact in found {
-        let first = order.partition_point(|index| known[*index as usize].particles < contact.particles);
+        let first = order.partition_point(|index| known[*index as usize].points < contact.points);
         let mine = order[first..].iter().map(|index| &known[*index as usize]);
-        let alike = mine.take_while(|other| other.particles == contact.particles);
+        let alike = mine.take_while(|other| other.points == contact.points);
         let nearest = alike.max_by(|a, b| a.normal.dot(&contact.normal).total_cmp(&b.normal.dot(&contact.normal)));
         contact.load = nearest.filter(|other| other.normal.dot(&contact.normal) > SAME).map_or(0.0, |other| other.load);
     }

@@ -181,9 +181,9 @@ impl BodySolver {
         } else {
             vec![DVec3::zeros(); body.len()]
         };
-        let mut loads = vec![0.0; body.len()];
-        for (particle, load) in body.order.index_of.iter().zip(&state.loads) {
-            loads[*particle as usize] = *load;
+        let mut loads = vec![0.0; body.contact_point_count()];
+        for (point, load) in body.contact_indices().zip(&state.loads) {
+            loads[point] = *load;
         }
         let mut motion =
             Kinematics { x: vectors(&state.positions), v: vectors(&state.velocities), acceleration, loads };
@@ -210,12 +210,12 @@ impl BodySolver {
         describe(&mut report, &context, &energies, &motion);
         report.lost_share = lost_share(report.energy_lost, [&before, &energies], body, gravity.norm() * seconds);
         state.acceleration.resize(body.len(), [0.0; 3]);
-        state.loads.resize(body.len(), 0.0);
+        state.loads.clear();
+        state.loads.extend(body.contact_indices().map(|point| motion.loads[point]));
         for (caller, particle) in body.order.index_of.iter().enumerate() {
             state.positions[caller] = motion.x[*particle as usize].into();
             state.velocities[caller] = motion.v[*particle as usize].into();
             state.acceleration[caller] = motion.acceleration[*particle as usize].into();
-            state.loads[caller] = motion.loads[*particle as usize];
         }
         report
     }

@@ -1,12 +1,12 @@
 //! The coarse (Galerkin) matrix PᵀAP, where P maps rigid motions of clusters to particles.
 
 use super::body::SoftBody;
-use super::cholesky::Lower;
 use super::coarse::{ContactFilters, Layout, MODES};
-use super::partition::Partition;
-use super::rank_one::{RankOneTerms, add_square};
 use super::springs::Record;
 use super::system::System;
+use numerics::cholesky::EnvelopeMatrix;
+use numerics::partition::Partition;
+use numerics::rank_one::{RankOneTerms, add_square};
 use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
 
 /// Contacts between bodies are left out where they make factoring more than this many times as dear.
@@ -28,11 +28,11 @@ pub(super) struct Galerkin<'a> {
 
 impl Galerkin<'_> {
     /// Assembles the matrix and factors it.
-    pub(super) fn factor(&self) -> Lower {
+    pub(super) fn factor(&self) -> EnvelopeMatrix {
         let (layout, transient) = (self.layout, &self.system.transient);
         let (rows, first) = envelope(layout, self.system);
         let begin = |row: usize| MODES * first[row / MODES] as usize;
-        let mut matrix = Lower::zeros((0..layout.rows()).map(begin));
+        let mut matrix = EnvelopeMatrix::zeros((0..layout.rows()).map(begin));
         let bands = Partition::new(matrix.bands(MODES));
         bands.for_each(matrix.values_mut(), |cluster, out: &mut [f64]| {
             write(&self.band(first[cluster] as usize, cluster), out);
@@ -116,7 +116,7 @@ impl Galerkin<'_> {
     }
 
     /// Adds rank-one terms, those before `end`.
-    fn add_rank_one_terms(&self, rows: &RankOneTerms, end: usize, matrix: &mut Lower) {
+    fn add_rank_one_terms(&self, rows: &RankOneTerms, end: usize, matrix: &mut EnvelopeMatrix) {
         let Some(partition) = rows.partition() else { return };
         let of_part = |part, ()| -> Vec<Vec<Coupling>> {
             partition.range(part).filter(|row| *row < end).map(|row| self.couplings(rows, row)).collect()

@@ -4,7 +4,7 @@
 //! contacts act on particles. By default a frame is one step of TR-BDF2 with one Newton iteration for each of its two
 //! stages. The linear systems are solved matrix-free by conjugate gradients with a two-level preconditioner.
 //!
-//! Inside the solver a *particle* is an index in the solver's own order (see `particle_order`); *the caller's indices*
+//! Inside the solver a *particle* is an index in the solver's own order (see [`numerics::cluster_order`]); *the caller's indices*
 //! are those of the input. A *piece* is a connected component of the spring graph, a *cluster* a compact
 //! part of a piece.
 //!
@@ -15,12 +15,10 @@
 //! method; spring stiffnesses are stored in f32, so forces are accurate to 1e-7 of the stiffest spring at a particle.
 //! Everything else is f64, in metres, seconds, kilograms.
 
-mod adjacency;
 mod assemble;
 mod balance;
 mod body;
 mod bounce;
-mod cholesky;
 mod coarse;
 mod conjugate_gradients;
 mod contact;
@@ -31,11 +29,8 @@ mod frame;
 mod friction;
 mod galerkin;
 mod momentum;
-mod particle_order;
-mod partition;
 mod plastic;
 mod predictor;
-mod rank_one;
 mod regions;
 mod search;
 mod springs;

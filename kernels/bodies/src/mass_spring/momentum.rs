@@ -4,9 +4,9 @@
 use super::assemble::velocities;
 use super::body::SoftBody;
 use super::contact::{ContactConstraint, ContactMode};
-use super::particle_order::pieces;
-use super::predictor::CayleyRotation;
 use super::stage::{FrameContext, Stage, StageSolver};
+use numerics::pieces::pieces;
+use numerics::rotation::CayleyRotation;
 use numerics::vector::{DMat3, DVec3};
 
 /// Total residual and translational stiffness of each group.
@@ -52,10 +52,10 @@ impl StageSolver {
         }
         let mut links = Vec::new();
         for contact in contacts {
-            let first = contact.particles[0] as usize;
+            let first = piece_of(contact.first_particle());
             for (particle, _) in contact.sides() {
                 touched[piece_of(particle) as usize] = true;
-                links.push([piece_of(first), piece_of(particle)]);
+                links.push([first, piece_of(particle)]);
             }
         }
         let groups = pieces(pieces_in_all, links.into_iter());
@@ -86,12 +86,12 @@ impl StageSolver {
         let known = stage.contacts.iter().zip(&self.contact_states).zip(&self.friction_duals).enumerate();
         let obstacle_contacts = known.filter(|known| known.1.0.1.mode != ContactMode::Open).filter_map(
             |(index, ((contact, state), dual))| {
-                let piece = self.layout.piece_of(contact.particles[0] as usize);
+                let piece = self.layout.piece_of(contact.first_particle());
                 let group = self.groups[piece].filter(|_| !contact.is_two_sided())? as usize;
                 Some(ObstacleContact {
                     group,
                     contact: index,
-                    weight: contact.weights.iter().sum(),
+                    weight: contact.point_weights.iter().sum(),
                     directions: contact.stiffness_directions(state, stage.a, dual),
                 })
             },

@@ -5,6 +5,7 @@
 //! prediction affects only the initial guess, not the equations.
 
 use super::body::SoftBody;
+use numerics::rotation::CayleyRotation;
 use numerics::vector::{DMat3, DVec3};
 use std::ops::Range;
 
@@ -214,43 +215,5 @@ impl<'a> Predictor<'a> {
             order.clusters.range(cluster).zip(out).for_each(|(particle, out)| *out = of(piece, particle));
         });
         out
-    }
-}
-
-/// A rotation by the Cayley transform: exactly orthogonal and without trigonometric functions. Its angle is
-/// 2·atan(|w|/2), equal to |w| up to third order.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct CayleyRotation {
-    half: DVec3,
-    scale: f64,
-}
-
-impl CayleyRotation {
-    pub(super) fn by(w: DVec3) -> Self {
-        let half = w * 0.5;
-        Self { half, scale: 2.0 / (1.0 + half.norm_squared()) }
-    }
-
-    pub(super) fn apply(&self, v: DVec3) -> DVec3 {
-        v + (self.half.cross(&v) + self.half.cross(&self.half.cross(&v))) * self.scale
-    }
-
-    pub(super) fn undo(&self, v: DVec3) -> DVec3 {
-        v + (self.half.cross(&self.half.cross(&v)) - self.half.cross(&v)) * self.scale
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_rotation_preserves_length_and_has_an_inverse() {
-        let turn = CayleyRotation::by(DVec3::new(0.3, -2.0, 1.0));
-        let v = DVec3::new(1.0, 2.0, -3.0);
-        assert!((turn.apply(v).norm() - v.norm()).abs() < 1e-14);
-        assert!((turn.undo(turn.apply(v)) - v).norm() < 1e-14);
-        // A quarter turn, 2·atan(1), about z.
-        assert!((CayleyRotation::by(DVec3::z() * 2.0).apply(DVec3::x()) - DVec3::y()).norm() < 1e-15);
     }
 }

@@ -7,9 +7,10 @@
 //! much cheaper than single tetrahedra. Limit: volume can move within a region; there only the springs and the
 //! barrier against inversion resist.
 
-use super::particle_order::{pieces, split};
-use super::partition::Partition;
 use crate::tets::oriented_boundary;
+use numerics::cluster_order::split;
+use numerics::partition::Partition;
+use numerics::pieces::pieces;
 use numerics::vector::DVec3;
 
 /// Tetrahedra in a region, about eight cells of six. With 160 a frame costs a tenth less and a pressed block bulges

@@ -247,17 +247,18 @@ impl StageSolver {
     }
 }
 
-/// Stops single particles on their way from `x` to `trial` where they would get too deep into a contact; returns
+/// Stops single points on their way from `x` to `trial` where they would get too deep into a contact; returns
 /// whether there were any. The direction does not know of contacts that it closes and linearises their forces; a
-/// single such particle would otherwise shorten the step of all others.
+/// single such point would otherwise shorten the step of all others.
 fn stop(context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3], trial: &mut [DVec3]) -> bool {
     let mut stopped = false;
-    for contact in stage.contacts {
-        let Some((particle, weight)) = contact.single_particle().filter(|side| !context.external.held[side.0]) else {
+    let held = &context.external.held;
+    for contact in stage.contacts.iter().filter(|contact| contact.is_of_one_point()) {
+        if contact.sides().all(|side| held[side.0]) {
             continue;
-        };
+        }
         if let Some(back) = contact.overshoot(x, trial) {
-            trial[particle] += contact.normal * (back / weight);
+            contact.shift(back, held, trial);
             stopped = true;
         }
     }

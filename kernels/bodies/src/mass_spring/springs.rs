@@ -7,9 +7,9 @@
 //! H = αI + (a²K − α)nnᵀ with α = a²K·max(0, 1 − R/l): Baraff & Witkin 1998 without the indefinite part, so it is
 //! positive semi-definite at any length. K and R combine spring and dashpot, see [`Link`].
 
-use super::adjacency::Incident;
 use super::body::SoftBody;
-use super::partition::RaggedSlice;
+use numerics::adjacency::Incident;
+use numerics::partition::RaggedSlice;
 use numerics::random::Key;
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 

@@ -2,8 +2,8 @@
 
 use super::body::SoftBody;
 use super::bounce::Impact;
-use super::cholesky::Lower;
 use super::coarse::ContactFilters;
+use numerics::cholesky::EnvelopeMatrix;
 use serde::{Deserialize, Serialize};
 
 /// Everything that later frames depend on: after saving and restoring it they have the same bits.
@@ -26,7 +26,7 @@ pub struct State {
     pub torn: Vec<bool>,
     /// Acceleration in the last step, m/s², for the predictor; empty at the start.
     pub(super) acceleration: Vec<[f64; 3]>,
-    /// The last normal force of contacts on each particle, newtons; empty at the start.
+    /// The last normal force of contacts on each contact point, newtons; empty at the start.
     pub(super) loads: Vec<f64>,
     /// Number of steps still to be taken with implicit Euler.
     pub(super) euler_steps_left: u32,
@@ -40,7 +40,7 @@ pub struct State {
 /// The factored coarse matrix, kept while it is good enough; iteration counts depend on it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct CachedCoarseFactor {
-    pub(super) factor: Lower,
+    pub(super) factor: EnvelopeMatrix,
     pub(super) filters: ContactFilters,
     /// Iterations of a solve when it was new, for each stage of a step; 0 before the first.
     pub(super) initial_iterations: [u32; 2],

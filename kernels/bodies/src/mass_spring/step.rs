@@ -33,7 +33,7 @@ pub(super) struct Kinematics {
     pub(super) v: Vec<DVec3>,
     /// Acceleration in the last step, m/s²; used only by the predictor.
     pub(super) acceleration: Vec<DVec3>,
-    /// The last normal forces of contacts on each particle, newtons.
+    /// The last normal forces of contacts on each contact point, newtons.
     pub(super) loads: Vec<f64>,
 }
 

@@ -6,9 +6,9 @@
 //! 1e7.) Vectors are f64.
 
 use super::body::SoftBody;
-use super::partition::Partition;
-use super::rank_one::RankOneTerms;
 use super::springs::Record;
+use numerics::partition::Partition;
+use numerics::rank_one::RankOneTerms;
 use numerics::vector::DVec3;
 
 /// M + a²K + aC at some positions.

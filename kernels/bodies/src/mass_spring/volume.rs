@@ -7,7 +7,7 @@
 //! system positive semi-definite.
 
 use super::body::{SoftBody, volume};
-use super::partition::{Partition, RaggedSlice};
+use numerics::partition::{Partition, RaggedSlice};
 use numerics::vector::DVec3;
 
 /// Bulk modulus of the springs ÷ E: their Poisson ratio is a quarter.

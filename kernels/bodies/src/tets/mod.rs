@@ -47,6 +47,7 @@ pub use enclosure::bounds;
 pub(crate) use enclosure::{Enclosure, Exit};
 pub use repair::{PolygonSurface, RepairCounts};
 pub use solid::{FillQuality, FillSettings, SLIVER, ShellSide, TetMesh};
+pub(crate) use solid_angle::SolidAngles;
 pub use surface_fault::SurfaceFault;
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ const FAR: f64 = 3.0;
 const LEAF: usize = 8;
 
 /// Triangles in a hierarchy of dipoles.
-pub(super) struct SolidAngles {
+pub(crate) struct SolidAngles {
     /// Corners, in the order of the leaves.
     triangles: Vec<[DVec3; 3]>,
     /// Nodes in depth-first order.
@@ -38,7 +38,7 @@ struct Dipole {
 
 impl SolidAngles {
     /// Of `triangles` over `points`.
-    pub(super) fn new(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+    pub(crate) fn new(points: &[Vec3], triangles: &[[u32; 3]]) -> Self {
         let corners = |triangle: &[u32; 3]| triangle.map(|corner| to_f64(points[corner as usize]));
         let mut new = Self { triangles: triangles.iter().map(corners).collect(), nodes: Vec::new() };
         if !triangles.is_empty() {
@@ -76,7 +76,7 @@ impl SolidAngles {
     }
 
     /// The winding number around a point.
-    pub(super) fn winding(&self, p: DVec3) -> f64 {
+    pub(crate) fn winding(&self, p: DVec3) -> f64 {
         let (mut sum, mut at) = (0.0, 0);
         while let Some(node) = self.nodes.get(at) {
             let to = node.centre - p;

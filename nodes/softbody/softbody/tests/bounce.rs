@@ -82,3 +82,26 @@ fn what_an_undamped_cube_loses_is_published() {
     let left = last["kinetic"] + last["elastic"];
     assert!((lost + left - 2.0).abs() < 1e-3 && left < 0.1, "{lost} J lost, {left} J left");
 }
+
+/// A cube that hits the ground at 45°: how fast it slides on, against that of 256 steps a frame.
+#[test]
+fn a_cube_that_hits_the_ground_obliquely_keeps_the_speed_that_short_steps_give() {
+    let speed = |stiffness: f32, friction: f32, substeps: i64| {
+        let cube = block([4; 3], [0.0, 0.05, 0.0], [0.1; 3]);
+        let thrown = simulating(cube).set(GROUND, true).set(GRAVITY, [0.0; 3]).set(INITIAL_VELOCITY, [2.0, -2.0, 0.0]);
+        let thrown = thrown.set(STIFFNESS, stiffness.into()).set(FRICTION, friction.into()).set(DAMPING, 1e-3.into());
+        let frames = thrown.set(SELF_COLLISION, false).set(SUBSTEPS, substeps).frames([8, 10]);
+        let mean = |frame: &BenchResult| {
+            let points = frame.mesh().positions();
+            points.iter().map(|p| f64::from(p[0])).sum::<f64>() / points.len() as f64
+        };
+        (mean(&frames[1]) - mean(&frames[0])) / (2.0 * H)
+    };
+    for stiffness in [1e5, 1e6, 1e7, 1e8] {
+        for friction in [0.1, 0.3] {
+            let [found, fine] = [0, 256].map(|substeps| speed(stiffness, friction, substeps));
+            println!("E {stiffness:e} Pa, μ {friction}: {found:.3} m/s, with 256 steps {fine:.3}");
+            assert!((found / fine - 1.0).abs() < 0.05, "E {stiffness}, μ {friction}: {found} for {fine} m/s");
+        }
+    }
+}

@@ -139,3 +139,22 @@ fn what_cannot_be_pushed_out_is_counted_after_twelve_frames() {
     let apart = simulating(cube()).set(GRAVITY, [0.0; 3]).frames(1..=15);
     assert!(apart.iter().all(|frame| !frame.metrics.contains_key("not_pushed_out")));
 }
+
+/// A plate of 0.2 m that starts 1.4 mm inside a cube, as a rolling pin may in its dough, and goes on pressing by 2 mm a
+/// frame: what it did not start in meets it like any other collider.
+#[test]
+fn a_collider_that_starts_in_a_body_may_go_on_pressing() {
+    let press = |frame: Frame| {
+        let pressed = 0.0014 + 0.002 * (frame.number() - 1.0).min(8.0) as f32;
+        solid([-0.05, 0.1 - pressed, -0.05], 0.2).into()
+    };
+    let bench = simulating(cube()).set(GROUND, true).set(STIFFNESS, 3e4.into()).moving(COLLIDERS, press);
+    let frames = bench.frames(1..=16);
+    assert_eq!(frames[0].metrics["started_in_colliders"], 1.0);
+    for (over, frame) in frames.iter().enumerate().skip(1) {
+        let metrics = &frame.metrics;
+        assert!(metrics["deepest_overlap"] < 2.4e-3 && metrics["caps_hit"] == 0.0, "{over}: {metrics:?}");
+        assert!(over < 12 || metrics["points_inside"] == 0.0, "{over}: {metrics:?}");
+        assert!(metrics["newton"] < 30.0 && metrics["inverted_tets"] == 0.0, "{over}: {metrics:?}");
+    }
+}

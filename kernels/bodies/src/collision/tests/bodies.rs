@@ -104,9 +104,9 @@ fn projecting_onto_contacts_keeps_vertices_outside_a_rolling_pin() {
         contacts.retain(|contact| contact.weights[1] == 0.0);
         for _ in 0..50 {
             for contact in &contacts {
-                let (p, n) = (DVec3::from(now[contact.particles[0] as usize]), DVec3::from(contact.normal));
+                let (p, n) = (DVec3::from(now[contact.points[0] as usize]), DVec3::from(contact.normal));
                 let lacks = (contact.offset + contact.gap - n.dot(&p)).max(0.0);
-                now[contact.particles[0] as usize] = (p + n * lacks).into();
+                now[contact.points[0] as usize] = (p + n * lacks).into();
             }
         }
         assert!(now.iter().all(|p| p[1] > -1e-9));
@@ -259,7 +259,7 @@ fn stacked(boxes: usize) -> [f64; 2] {
     }
     let body = body(&points, &tets, 1e5);
     let surfaces: Vec<&[[u32; 3]]> = surfaces.iter().map(Vec::as_slice).collect();
-    let skins = BodySkin::several(&points, &surfaces, &body.springs()).unwrap();
+    let skins = BodySkin::several(&points, &[], &surfaces, &body.springs()).unwrap();
     let ground = Some(Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness: THICKNESS, friction: 0.5 });
     let body_contact = Some(ContactParams { thickness: THICKNESS, friction: 0.5 });
     let scene = CollisionScene { skins: &skins, ground, body_contact, ..CollisionScene::default() };

@@ -38,7 +38,7 @@ fn a_particle_that_went_through_a_plate_is_drawn_back_to_its_side() {
     let contacts: Vec<Contact> = self::find(&scene, &from, &from, [0.0, 1.0]);
     // 50 mm beyond the lower side, of which 10 gaps go in this step.
     let [contact] = contacts[..] else { panic!("{contacts:?}") };
-    assert_eq!((contact.particles[0], contact.normal), (0, [0.0, -1.0, 0.0]));
+    assert_eq!((contact.points[0], contact.normal), (0, [0.0, -1.0, 0.0]));
     assert!((contact.offset - (-0.2 - 0.04)).abs() < 1e-12, "{contact:?}");
     let kept = |to: [f64; 3]| !scene.caught_after(&from, &moved(to)).is_empty();
     assert!(kept([0.03, 0.21, 0.02]) && kept([-0.2, 0.4, 0.02]));

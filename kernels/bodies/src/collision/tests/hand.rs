@@ -22,7 +22,7 @@ fn a_vertex_falling_through_a_square_gives_one_contact_above_it() {
     let contacts = find(&scene, &from, &to, [0.0, 1.0]);
     assert_eq!(contacts.len(), 1);
     let contact = contacts[0];
-    assert_eq!((contact.particles, contact.weights), ([0; 4], [1.0, 0.0, 0.0, 0.0]));
+    assert_eq!((contact.points, contact.weights), ([0; 4], [1.0, 0.0, 0.0, 0.0]));
     assert_eq!((contact.normal, contact.offset, contact.gap), ([0.0, 1.0, 0.0], 0.0, 0.01));
     assert_eq!((contact.velocity, contact.friction), ([0.0; 3], 0.25));
     // From below it is kept below.
@@ -61,8 +61,8 @@ fn crossing_edges_make_contact_at_their_crossing() {
         [0.0, 1.0],
     );
     assert_eq!(contacts.len(), 1, "{contacts:?}");
-    let Contact { particles, weights, normal, offset, .. } = contacts[0];
-    assert_eq!(particles, [0, 1, 0, 0]);
+    let Contact { points, weights, normal, offset, .. } = contacts[0];
+    assert_eq!(points, [0, 1, 0, 0]);
     assert!((weights[0] - 0.75).abs() < 1e-12 && (weights[1] - 0.25).abs() < 1e-12);
     assert!((DVec3::from(normal) - DVec3::y()).norm() < 1e-12 && offset.abs() < 1e-12);
 }
@@ -153,7 +153,7 @@ fn ground_contacts_come_first_and_those_above_them_are_kept() {
     let contacts = find(&scene, &still, &still, [0.0, 1.0]);
     assert!(contacts.len() > 3, "{contacts:?}");
     for (particle, contact) in (0..3).zip(&contacts) {
-        assert_eq!((contact.particles[0], contact.normal, contact.friction), (particle, [0.0, 1.0, 0.0], 0.3));
+        assert_eq!((contact.points[0], contact.normal, contact.friction), (particle, [0.0, 1.0, 0.0], 0.3));
     }
     assert!(contacts[3..].iter().any(|contact| contact.normal[1] < -0.5 && contact.jammed), "{contacts:?}");
 }
@@ -208,15 +208,15 @@ fn facing_sheets_touch_but_neighbouring_elements_do_not() {
     to[..2].iter_mut().for_each(|p| p[0] -= 2.2);
     to[..2].iter_mut().for_each(|p| p[1] += 0.15);
     let contacts = find(&scene, &points, &to, [0.0, 1.0]);
-    assert!(contacts.iter().any(|contact| contact.particles[0] < 2 && contact.weights[0] == 1.0), "{contacts:?}");
+    assert!(contacts.iter().any(|contact| contact.points[0] < 2 && contact.weights[0] == 1.0), "{contacts:?}");
     for contact in &contacts {
         assert!(contact.weights.iter().sum::<f64>().abs() < 1e-12);
         let kind = |particle: u32| particle / 2;
         assert!(
             contact
-                .particles
+                .points
                 .iter()
-                .any(|p| kind(*p) > kind(contact.particles[0]) + 2 || kind(*p) + 2 < kind(contact.particles[0]))
+                .any(|p| kind(*p) > kind(contact.points[0]) + 2 || kind(*p) + 2 < kind(contact.points[0]))
         );
     }
 }

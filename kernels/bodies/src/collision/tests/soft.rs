@@ -77,7 +77,7 @@ fn inner_particles_meet_obstacles_and_other_skins_but_not_their_own() {
     let shifted: Vec<[u32; 3]> = outer.iter().map(|face| face.map(|corner| corner + first)).collect();
     let tets = tets.iter().copied().chain(others.iter().map(|tet| tet.map(|corner| corner + first)));
     let links: Vec<[u32; 2]> = tets.flat_map(|[a, b, c, d]| [[a, b], [a, c], [a, d]]).chain([[26, first]]).collect();
-    let skins = BodySkin::several(&all, &[&faces, &shifted], &links).unwrap();
+    let skins = BodySkin::several(&all, &[], &[&faces, &shifted], &links).unwrap();
     assert_eq!(skins[0].touching, (0..first).collect::<Vec<_>>(), "the one in the middle is found by its links");
     assert_eq!(skins[1].touching, (first..all.len() as u32).collect::<Vec<_>>());
 
@@ -89,7 +89,7 @@ fn inner_particles_meet_obstacles_and_other_skins_but_not_their_own() {
     let plate: Vec<[f64; 3]> = plate.iter().map(|[x, y, z]| [*x, *y, z + 0.3]).collect();
     let obstacles = [Obstacle::new(&triangles, &[pose(0.0, &plate)], 1.0, 0.06, 0.5).unwrap()];
     let mine = |scene: &CollisionScene<'_>| {
-        find(scene, &all, &to, [0.0, 1.0]).iter().filter(|contact| contact.particles[0] == inner).count()
+        find(scene, &all, &to, [0.0, 1.0]).iter().filter(|contact| contact.points[0] == inner).count()
     };
     let bare = CollisionScene { skins: &skins, ..CollisionScene::default() };
     assert_eq!(mine(&CollisionScene { body_contact: touch, ..bare }), 1);

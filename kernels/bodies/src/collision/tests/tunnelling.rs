@@ -46,7 +46,7 @@ fn no_fast_vertex_tunnels_through_a_plate_or_a_blade() {
         let contacts = find(&scene, &from, &to, [0.0, 1.0]);
         let mut of = vec![Vec::new(); from.len()];
         for contact in contacts.iter().filter(|contact| contact.weights == [1.0, 0.0, 0.0, 0.0]) {
-            of[contact.particles[0] as usize].push(contact);
+            of[contact.points[0] as usize].push(contact);
         }
         let (mut through, mut near) = (0, 0);
         for vertex in 0..from.len() {
@@ -117,8 +117,7 @@ fn no_fast_edge_tunnels_through_a_ridge() {
         if x.iter().all(|x| (0.0..=1.0).contains(x)) {
             through += 1;
             let pair = [3 * k as u32, 3 * k as u32 + 1];
-            let mut mine =
-                contacts.iter().filter(|contact| contact.particles[..2] == pair && contact.weights[1] != 0.0);
+            let mut mine = contacts.iter().filter(|contact| contact.points[..2] == pair && contact.weights[1] != 0.0);
             assert!(
                 mine.any(|contact| DVec3::from(contact.normal).dot(&displacement) < 0.0
                     && (contact.weights[1] - x[0]).abs() < 1e-6),
@@ -172,7 +171,7 @@ fn a_scene_a_thousand_times_larger_or_smaller_has_the_same_contacts() {
         let scaled = spin(scale);
         assert_eq!(scaled.len(), plain.len(), "{scale}");
         for (a, b) in scaled.iter().zip(&plain) {
-            assert_eq!(a.particles, b.particles);
+            assert_eq!(a.points, b.points);
             assert!((DVec3::from(a.normal) - DVec3::from(b.normal)).norm() < 1e-5, "{a:?} {b:?}");
             assert!((a.offset / scale - b.offset).abs() < 1e-6);
         }

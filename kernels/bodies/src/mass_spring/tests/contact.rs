@@ -19,7 +19,7 @@ impl ContactFinder for Planes {
                     .min(n.dot(&DVec3::from(query.from[particle])) - at(query.times[0]));
                 if nearest < 2.0 * THICKNESS {
                     out.push(Contact {
-                        particles: [particle as u32, 0, 0, 0],
+                        points: [particle as u32, 0, 0, 0],
                         weights: [1.0, 0.0, 0.0, 0.0],
                         normal: *normal,
                         offset,
@@ -65,7 +65,7 @@ impl ContactFinder for RollingPin {
                     0.0,
                 );
                 out.push(Contact {
-                    particles: [particle as u32, 0, 0, 0],
+                    points: [particle as u32, 0, 0, 0],
                     weights: [1.0, 0.0, 0.0, 0.0],
                     normal: n.into(),
                     offset: n.dot(&middle) + self.radius,
@@ -301,7 +301,7 @@ impl ContactFinder for Stack {
             };
             if height(query.from) > -0.05 && height(query.to).min(height(query.from)) < 2.0 * THICKNESS {
                 out.push(Contact {
-                    particles: [particle as u32, corners[0], corners[1], corners[2]],
+                    points: [particle as u32, corners[0], corners[1], corners[2]],
                     weights: [1.0, -weights[0], -weights[1], -weights[2]],
                     normal: [0.0, 1.0, 0.0],
                     offset: 0.0,

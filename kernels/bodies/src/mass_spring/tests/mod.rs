@@ -12,6 +12,7 @@ mod exact;
 mod goals;
 mod hostile;
 mod kept;
+mod riding;
 
 /// No gravity, no volume preservation: only springs.
 const BARE: SolverFrame<'static> = SolverFrame {

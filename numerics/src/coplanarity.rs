@@ -4,25 +4,27 @@
 //! Every sign change during the motion is found, up to rounding of its time. Limit: a plane that is touched and left
 //! again within rounding may count as two crossings or none.
 
-use numerics::vector::DVec3;
+use crate::vector::DVec3;
 
 /// Up to three times in 0…1, ascending, and whether the value was positive before each.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Roots {
+pub struct CrossingTimes {
     times: [f64; 3],
     above: [bool; 3],
     count: usize,
 }
 
-impl Roots {
-    pub(super) fn iter(&self) -> impl Iterator<Item = (f64, bool)> {
+impl CrossingTimes {
+    /// The times, and whether the value was positive before each.
+    #[inline]
+    pub fn iter(&self) -> impl Iterator<Item = (f64, bool)> {
         self.times.into_iter().zip(self.above).take(self.count)
     }
 }
 
 /// Result of a separating-axis test of two linearly moving elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Separation {
+pub enum MotionSeparation {
     /// Always farther apart than the given distance.
     Far,
     /// Possibly close, but they never cross.
@@ -35,15 +37,15 @@ pub(super) enum Separation {
 /// initial normal, and then, only for distance, along the in-plane normals of its sides and the directions normal to
 /// a side and the relative displacement.
 #[inline]
-pub(super) fn face_separation(start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Separation {
+pub fn face_separation(start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> MotionSeparation {
     let normal = start[0].cross(&start[1]);
     let separation = face_separation_along(&normal, start, end, reach);
-    if separation == Separation::Unknown {
+    if separation == MotionSeparation::Unknown {
         let pass = end[2] - start[2];
         for side in [start[0], start[1], start[1] - start[0]] {
             for axis in [normal.cross(&side), pass.cross(&side)] {
-                if face_separation_along(&axis, start, end, reach) == Separation::Far {
-                    return Separation::Far;
+                if face_separation_along(&axis, start, end, reach) == MotionSeparation::Far {
+                    return MotionSeparation::Far;
                 }
             }
         }
@@ -53,7 +55,7 @@ pub(super) fn face_separation(start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) 
 
 /// The same along one axis.
 #[inline]
-fn face_separation_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Separation {
+fn face_separation_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> MotionSeparation {
     let range = |[b, c, p]: &[DVec3; 3]| {
         let (one, two, offset) = (-axis.dot(b), -axis.dot(c), axis.dot(p));
         (offset + one.min(two).min(0.0), offset + one.max(two).max(0.0))
@@ -68,27 +70,27 @@ fn face_separation_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], rea
 ///
 /// Edges that stay parallel cannot cross unless their ends cross too.
 #[inline]
-pub(super) fn edge_separation(start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Separation {
+pub fn edge_separation(start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> MotionSeparation {
     /// Largest sine of the angle between parallel edges.
     const PARALLEL: f64 = 1e-9;
     let normal = start[0].cross(&start[1]);
     let separation = edge_separation_along(&normal, start, end, reach);
-    if separation != Separation::Unknown {
+    if separation != MotionSeparation::Unknown {
         return separation;
     }
     let pass = end[2] - start[2];
     let axes = [normal.cross(&start[0]), normal.cross(&start[1]), pass.cross(&start[0]), pass.cross(&start[1])];
-    if axes.iter().any(|axis| edge_separation_along(axis, start, end, reach) == Separation::Far) {
-        return Separation::Far;
+    if axes.iter().any(|axis| edge_separation_along(axis, start, end, reach) == MotionSeparation::Far) {
+        return MotionSeparation::Far;
     }
     let parallel =
         |[d, e, _]: &[DVec3; 3]| d.cross(e).norm_squared() <= PARALLEL * PARALLEL * d.norm_squared() * e.norm_squared();
-    if parallel(start) && parallel(end) { Separation::Near } else { Separation::Unknown }
+    if parallel(start) && parallel(end) { MotionSeparation::Near } else { MotionSeparation::Unknown }
 }
 
 /// The same along one axis.
 #[inline]
-fn edge_separation_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> Separation {
+fn edge_separation_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], reach: f64) -> MotionSeparation {
     let range = |[d, e, r]: &[DVec3; 3]| {
         let (one, two, offset) = (-axis.dot(d), axis.dot(e), axis.dot(r));
         (offset + one.min(0.0) + two.min(0.0), offset + one.max(0.0) + two.max(0.0))
@@ -99,15 +101,15 @@ fn edge_separation_along(axis: &DVec3, start: &[DVec3; 3], end: &[DVec3; 3], rea
 
 /// Classifies by the range of signed distances, each multiplied by the length of the axis.
 #[inline]
-fn classify(low: f64, high: f64, reach: f64, normal: &DVec3) -> Separation {
+fn classify(low: f64, high: f64, reach: f64, normal: &DVec3) -> MotionSeparation {
     let nearest = low.max(-high);
     let far = reach * (1.0 + 1e-9);
     if nearest > 0.0 && nearest * nearest > far * far * normal.norm_squared() {
-        Separation::Far
+        MotionSeparation::Far
     } else if nearest > 0.0 {
-        Separation::Near
+        MotionSeparation::Near
     } else {
-        Separation::Unknown
+        MotionSeparation::Unknown
     }
 }
 
@@ -117,7 +119,7 @@ fn det(a: &DVec3, b: &DVec3, c: &DVec3) -> f64 {
 
 /// Times at which the determinant of three linearly moving vectors changes sign.
 #[inline]
-pub(super) fn sign_changes(start: &[DVec3; 3], end: &[DVec3; 3]) -> Roots {
+pub fn sign_changes(start: &[DVec3; 3], end: &[DVec3; 3]) -> CrossingTimes {
     let [a, b, c] = start;
     let [p, q, r] = [end[0] - a, end[1] - b, end[2] - c];
     let (ab, aq, pb, pq) = (a.cross(b), a.cross(&q), p.cross(b), p.cross(&q));
@@ -128,7 +130,7 @@ pub(super) fn sign_changes(start: &[DVec3; 3], end: &[DVec3; 3]) -> Roots {
     let last = det(&end[0], &end[1], &end[2]);
     // The cubic stays within the range of its Bernstein coefficients.
     let held = [c0, c0 + c1 / 3.0, c0 + (2.0 * c1 + c2) / 3.0, last];
-    let mut roots = Roots::default();
+    let mut roots = CrossingTimes::default();
     if held.iter().all(|x| *x > 0.0) || held.iter().all(|x| *x < 0.0) {
         return roots;
     }
@@ -147,7 +149,7 @@ pub(super) fn sign_changes(start: &[DVec3; 3], end: &[DVec3; 3]) -> Roots {
     roots
 }
 
-/// Roots of c₁ + 2c₂t + 3c₃t² in 0…1, ascending.
+/// CrossingTimes of c₁ + 2c₂t + 3c₃t² in 0…1, ascending.
 fn turning_points(c1: f64, c2: f64, c3: f64) -> ([f64; 2], usize) {
     let (mut out, mut count) = ([0.0; 2], 0);
     let under = c2 * c2 - 3.0 * c1 * c3;

@@ -1,19 +1,19 @@
 //! Bounding boxes of moving elements in a tree sixteen wide, in f32, rounded outwards so that no overlap is missed.
 
-use super::POINTS;
-use super::surface::Positions;
-use numerics::lanes::{F32x16, LANES, set};
-use numerics::parallel;
-use numerics::simd::{Path, kernel};
-use numerics::tree::{Boxes, Cuboid, NONE, Region, TriangleTree};
-use numerics::vector::Vec3;
+use crate::lanes::{F32x16, LANES, set};
+use crate::parallel;
+use crate::simd::{Path, kernel};
+use crate::tree::{Boxes, Cuboid, NONE, Region, TriangleTree};
+use crate::vector::Vec3;
 
+/// Points that a thread takes at a time.
+const TASK: usize = 1024;
 /// Largest number of levels, enough for 2³² elements.
 const MOST_LEVELS: usize = 8;
 
-/// Elements of N points each, in groups of sixteen neighbours.
+/// SweptElements of N points each, in groups of sixteen neighbours.
 #[derive(Clone, Debug)]
-pub(super) struct Elements<const N: usize> {
+pub struct SweptElements<const N: usize> {
     points: Vec<[u32; N]>,
     /// Index of the element in each lane; [`NONE`] in unused ones.
     order: Vec<[u32; LANES]>,
@@ -21,19 +21,19 @@ pub(super) struct Elements<const N: usize> {
 
 /// Swept boxes of elements. The children of the box in lane l of row r are row 16r + l of the level below.
 #[derive(Clone, Debug)]
-pub(super) struct BoxTree<'a> {
+pub struct SweptBoxTree<'a> {
     order: &'a [[u32; LANES]],
     levels: Vec<Vec<Boxes>>,
     /// Bounds of everything.
-    pub(super) bounds: Cuboid,
+    pub bounds: Cuboid,
 }
 
 /// A box that overlaps nothing.
 const NOWHERE: Cuboid = Cuboid { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
 
-impl<const N: usize> Elements<N> {
+impl<const N: usize> SweptElements<N> {
     /// Groups elements by their positions in `pose`.
-    pub(super) fn new(points: Vec<[u32; N]>, pose: Positions<'_>) -> Self {
+    pub fn new(points: Vec<[u32; N]>, pose: &[[f64; 3]]) -> Self {
         // Each element becomes a degenerate triangle from its lowest to its highest corner, which the triangle tree
         // can sort.
         let boxes: Vec<Cuboid> = pose.iter().map(box_of).collect();
@@ -45,7 +45,7 @@ impl<const N: usize> Elements<N> {
     }
 
     /// The boxes of all elements, given those of their points, inflated by `reach`.
-    pub(super) fn sweep(&self, boxes: &[Cuboid], reach: f64) -> BoxTree<'_> {
+    pub fn sweep(&self, boxes: &[Cuboid], reach: f64) -> SweptBoxTree<'_> {
         let own = |element: u32| inflated(&bounds_of(&self.points[element as usize], boxes), reach);
         let leaf =
             |lanes: &[u32; LANES]| row(lanes.iter().map(|lane| if *lane == NONE { NOWHERE } else { own(*lane) }));
@@ -56,7 +56,7 @@ impl<const N: usize> Elements<N> {
             levels.push(next);
         }
         let bounds = levels[levels.len() - 1].first().map_or(NOWHERE, bounds);
-        BoxTree { order: &self.order, levels, bounds }
+        SweptBoxTree { order: &self.order, levels, bounds }
     }
 }
 
@@ -83,11 +83,11 @@ fn bounds(boxes: &Boxes) -> Cuboid {
 }
 
 /// The box of each point over all poses.
-pub(super) fn swept_boxes(poses: &[Positions<'_>]) -> Vec<Cuboid> {
+pub fn swept_boxes(poses: &[&[[f64; 3]]]) -> Vec<Cuboid> {
     let (first, others) = poses.split_first().map_or((&[][..], &[][..]), |(first, others)| (*first, others));
     let of = |point: usize| others.iter().fold(box_of(&first[point]), |own, pose| join(&own, &box_of(&pose[point])));
     let mut boxes = vec![NOWHERE; first.len()];
-    parallel::fill(&mut boxes, POINTS, of);
+    parallel::fill(&mut boxes, TASK, of);
     boxes
 }
 
@@ -115,20 +115,20 @@ fn join(a: &Cuboid, b: &Cuboid) -> Cuboid {
 
 /// Bounds of the boxes of some points.
 #[inline]
-pub(super) fn bounds_of(points: &[u32], boxes: &[Cuboid]) -> Cuboid {
+pub fn bounds_of(points: &[u32], boxes: &[Cuboid]) -> Cuboid {
     let first = boxes[points[0] as usize];
     points[1..].iter().fold(first, |all, point| join(&all, &boxes[*point as usize]))
 }
 
 /// Bounds of the boxes of those points that are finite.
-pub(super) fn bounds_of_finite(points: &[u32], boxes: &[Cuboid]) -> Cuboid {
+pub fn bounds_of_finite(points: &[u32], boxes: &[Cuboid]) -> Cuboid {
     let own = points.iter().map(|point| &boxes[*point as usize]).filter(|own| !own.low[0].is_nan());
     own.fold(NOWHERE, |all, own| join(&all, own))
 }
 
 /// A box inflated by `reach` on every side.
 #[inline]
-pub(super) fn inflated(a: &Cuboid, reach: f64) -> Cuboid {
+pub fn inflated(a: &Cuboid, reach: f64) -> Cuboid {
     let mut out = *a;
     for axis in 0..3 {
         out.low[axis] = below(f64::from(a.low[axis]) - reach);
@@ -146,13 +146,14 @@ fn below(x: f64) -> f32 {
 }
 
 /// Whether two boxes overlap.
-pub(super) fn overlap(a: &Cuboid, b: &Cuboid) -> bool {
+#[inline]
+pub fn overlap(a: &Cuboid, b: &Cuboid) -> bool {
     (0..3).all(|k| a.low[k] <= b.high[k] && b.low[k] <= a.high[k])
 }
 
-impl BoxTree<'_> {
-    /// Elements whose boxes overlap `region`, ascending.
-    pub(super) fn overlapping(&self, region: &Cuboid, out: &mut Vec<u32>) {
+impl SweptBoxTree<'_> {
+    /// SweptElements whose boxes overlap `region`, ascending.
+    pub fn overlapping(&self, region: &Cuboid, out: &mut Vec<u32>) {
         out.clear();
         if overlap(region, &self.bounds) {
             gather(Path::chosen(), self, region, out);
@@ -162,11 +163,11 @@ impl BoxTree<'_> {
 }
 
 kernel! {
-    fn gather(tree: &BoxTree<'_>, region: &Cuboid, out: &mut Vec<u32>) = gather_on;
+    fn gather(tree: &SweptBoxTree<'_>, region: &Cuboid, out: &mut Vec<u32>) = gather_on;
 }
 
 #[inline(always)]
-fn gather_on(tree: &BoxTree<'_>, region: &Cuboid, out: &mut Vec<u32>) {
+fn gather_on(tree: &SweptBoxTree<'_>, region: &Cuboid, out: &mut Vec<u32>) {
     let top = tree.levels.len() - 1;
     let (mut rows, mut lanes) = ([0; MOST_LEVELS], [0u16; MOST_LEVELS]);
     let mut level = top;
@@ -199,7 +200,7 @@ mod tests {
     #[test]
     fn boxes_beyond_single_precision_meet_all_and_only_elements() {
         let points: Vec<[f64; 3]> = (0..40).map(|k| [f64::from(k), 0.0, 0.0]).collect();
-        let elements = Elements::new((0..40).map(|k| [k]).collect(), &points);
+        let elements = SweptElements::new((0..40).map(|k| [k]).collect(), &points);
         let far = |x: f64| points.iter().map(|p| [p[0] + x, x, -x]).collect::<Vec<_>>();
         for x in [0.0, 1e38, 1e39, 1e300, -1e300] {
             for reach in [0.0, 1e39, f64::INFINITY] {

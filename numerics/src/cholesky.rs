@@ -5,8 +5,8 @@
 //! is singular to rounding the solution has no component, instead of a huge one. Cost: Σ b²/2 for rows of b entries,
 //! and Σ 2b a solve.
 
-use numerics::parallel;
-use numerics::simd::{Path, kernel};
+use crate::parallel;
+use crate::simd::{Path, kernel};
 use serde::{Deserialize, Serialize};
 
 /// Lanes of a sum.
@@ -20,16 +20,16 @@ const NEGLIGIBLE: f64 = 1e-11;
 
 /// The lower triangle of a symmetric matrix, or its factor, row by row.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Lower {
+pub struct EnvelopeMatrix {
     /// Start of each row in `values`, and the total at the end.
     starts: Vec<usize>,
     /// In a factor the diagonal holds reciprocals, 0 for a negligible pivot.
     values: Vec<f64>,
 }
 
-impl Lower {
+impl EnvelopeMatrix {
     /// A zero matrix whose rows start at the columns `firsts`.
-    pub(super) fn zeros(firsts: impl Iterator<Item = usize>) -> Self {
+    pub fn zeros(firsts: impl Iterator<Item = usize>) -> Self {
         let mut starts = vec![0];
         let mut size = 0;
         for (i, first) in firsts.enumerate() {
@@ -40,28 +40,33 @@ impl Lower {
     }
 
     /// Number of rows.
-    pub(super) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
+    /// Whether it has no rows.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     /// All stored entries.
-    pub(super) fn values_mut(&mut self) -> &mut [f64] {
+    pub fn values_mut(&mut self) -> &mut [f64] {
         &mut self.values
     }
 
     /// Start of every `count`-th row in the entries, and the total at the end.
-    pub(super) fn bands(&self, count: usize) -> Vec<usize> {
+    pub fn bands(&self, count: usize) -> Vec<usize> {
         self.starts.iter().step_by(count).copied().collect()
     }
 
     /// Adds to an entry of the envelope, with j ≤ i.
     #[inline(always)]
-    pub(super) fn add(&mut self, i: usize, j: usize, value: f64) {
+    pub fn add(&mut self, i: usize, j: usize, value: f64) {
         self.values[self.starts[i + 1] - 1 - (i - j)] += value;
     }
 
     /// Replaces the matrix by its factor.
-    pub(super) fn factor(&mut self) {
+    pub fn factor(&mut self) {
         let (path, n) = (Path::chosen(), self.len());
         let Self { starts, values } = self;
         // For each column, one past the last row that has an entry in it.
@@ -98,7 +103,7 @@ impl Lower {
     }
 
     /// Solves with the factor, in place.
-    pub(super) fn solve(&self, path: Path, x: &mut [f64]) {
+    pub fn solve(&self, path: Path, x: &mut [f64]) {
         solve(path, &self.starts, &self.values, x);
     }
 }
@@ -180,17 +185,17 @@ fn solve_body(starts: &[usize], values: &[f64], x: &mut [f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use numerics::random::Key;
+    use crate::random::Key;
 
     /// L·Lᵀ + s·I for a random L whose rows start at `first`, in envelope storage and as a full matrix.
-    fn matrix(n: usize, s: f64, first: impl Fn(usize) -> usize) -> (Lower, Vec<Vec<f64>>) {
+    fn matrix(n: usize, s: f64, first: impl Fn(usize) -> usize) -> (EnvelopeMatrix, Vec<Vec<f64>>) {
         let l = |i: usize, j: usize| {
             if j < first(i) || j > i { 0.0 } else { Key::new(3).of((i * n + j) as u64).f64() - 0.5 }
         };
         let product =
             |i: usize, j: usize| (0..n).map(|k| l(i, k) * l(j, k)).sum::<f64>() + if i == j { s } else { 0.0 };
         let full: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| product(i, j)).collect()).collect();
-        let mut lower = Lower::zeros((0..n).map(&first));
+        let mut lower = EnvelopeMatrix::zeros((0..n).map(&first));
         for (i, row) in full.iter().enumerate() {
             (first(i)..=i).for_each(|j| lower.add(i, j, row[j]));
         }
@@ -233,7 +238,7 @@ mod tests {
     #[test]
     fn null_space_components_of_the_solution_are_zero() {
         // diag(4, 0, 9): the middle row and column are zero.
-        let mut lower = Lower::zeros([0, 0, 0].into_iter());
+        let mut lower = EnvelopeMatrix::zeros([0, 0, 0].into_iter());
         lower.add(0, 0, 4.0);
         lower.add(2, 2, 9.0);
         lower.factor();

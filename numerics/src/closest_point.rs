@@ -1,36 +1,51 @@
 //! Closest points of triangles and segments, in f64.
 
-use super::surface::Feature;
-use numerics::vector::DVec3;
+use crate::vector::DVec3;
 
 /// The closest point of a triangle.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct ClosestPoint {
-    pub(super) face: u32,
+pub struct ClosestPoint {
+    /// Index of the triangle, as given.
+    pub face: u32,
     /// Barycentric weights, non-negative, with sum 1; exactly 0 away from a corner or its sides.
-    pub(super) weights: [f64; 3],
-    pub(super) point: DVec3,
-    pub(super) distance: f64,
+    pub weights: [f64; 3],
+    /// Its position.
+    pub point: DVec3,
+    /// Its distance.
+    pub distance: f64,
+}
+
+/// Part of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TriangleFeature {
+    /// Its interior.
+    Inside,
+    /// The side opposite to this corner.
+    Side(usize),
+    /// This corner.
+    Corner(usize),
 }
 
 impl ClosestPoint {
     /// The point of `face` with these corners that is closest to `p` (Ericson, Real-Time Collision Detection, 5.1.5).
     #[inline]
-    pub(super) fn on(face: u32, p: DVec3, corners: [DVec3; 3]) -> Self {
+    pub fn on(face: u32, p: DVec3, corners: [DVec3; 3]) -> Self {
         let weights = weights(p, corners);
         let point = corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2];
         Self { face, weights, point, distance: (p - point).norm() }
     }
 
-    pub(super) fn feature(&self) -> Feature {
+    /// The part of the triangle that it is on, by its weights.
+    #[inline]
+    pub fn feature(&self) -> TriangleFeature {
         match self.weights.map(|weight| weight > 0.0) {
-            [true, true, true] => Feature::Inside,
-            [false, true, true] => Feature::Side(0),
-            [true, false, true] => Feature::Side(1),
-            [true, true, false] => Feature::Side(2),
-            [true, _, _] => Feature::Corner(0),
-            [_, true, _] => Feature::Corner(1),
-            _ => Feature::Corner(2),
+            [true, true, true] => TriangleFeature::Inside,
+            [false, true, true] => TriangleFeature::Side(0),
+            [true, false, true] => TriangleFeature::Side(1),
+            [true, true, false] => TriangleFeature::Side(2),
+            [true, _, _] => TriangleFeature::Corner(0),
+            [_, true, _] => TriangleFeature::Corner(1),
+            _ => TriangleFeature::Corner(2),
         }
     }
 }
@@ -78,7 +93,7 @@ fn weights(p: DVec3, [a, b, c]: [DVec3; 3]) -> [f64; 3] {
 }
 
 /// Barycentric weights of the projection of `p` to the plane of a triangle; negative beyond a side.
-pub(super) fn projected(p: DVec3, [a, b, c]: [DVec3; 3], normal: DVec3) -> [f64; 3] {
+pub fn projected(p: DVec3, [a, b, c]: [DVec3; 3], normal: DVec3) -> [f64; 3] {
     let area = (b - a).cross(&(c - a)).dot(&normal);
     let v = (p - a).cross(&(c - a)).dot(&normal) / area;
     let w = (b - a).cross(&(p - a)).dot(&normal) / area;
@@ -86,7 +101,7 @@ pub(super) fn projected(p: DVec3, [a, b, c]: [DVec3; 3], normal: DVec3) -> [f64;
 }
 
 /// Parameters of the closest points of two segments, 0…1 (Ericson, 5.1.9).
-pub(super) fn along([p, q]: [DVec3; 2], [a, b]: [DVec3; 2]) -> [f64; 2] {
+pub fn along([p, q]: [DVec3; 2], [a, b]: [DVec3; 2]) -> [f64; 2] {
     let (d, e, r) = (q - p, b - a, p - a);
     let (dd, ee, er) = (d.norm_squared(), e.norm_squared(), e.dot(&r));
     let dr = d.dot(&r);
@@ -110,7 +125,7 @@ fn share_signed(part: f64, whole: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use numerics::random::Key;
+    use crate::random::Key;
 
     fn random(seed: u64, k: u64) -> DVec3 {
         let key = Key::new(seed).of(k);

@@ -1,12 +1,13 @@
-//! The solver's order of particles: piece by piece and, within a piece, cluster by cluster, so that neighbours are
+//! An order of particles for solvers: piece by piece and, within a piece, cluster by cluster, so that neighbours are
 //! near each other in memory and a cluster is a range of indices.
 //!
 //! Clusters come from recursive median splits along the longest side, which makes them compact and of equal size on
 //! any mesh. They are ordered so that coupled clusters have near indices, for the envelope of the coarse matrix. The
 //! result does not depend on how a sort orders equal keys.
 
-use super::partition::Partition;
-use numerics::vector::DVec3;
+use crate::partition::Partition;
+use crate::pieces::pieces;
+use crate::vector::DVec3;
 use std::ops::Range;
 
 /// A body of n particles has CLUSTERS·n^GROWTH clusters. That keeps the number of iterations nearly constant from
@@ -20,20 +21,20 @@ const LEAF: usize = 8;
 
 /// The solver's order.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Order {
+pub struct ClusterOrder {
     /// The caller's index of each particle.
-    pub(super) caller_of: Vec<u32>,
+    pub caller_of: Vec<u32>,
     /// The solver's index for each of the caller's.
-    pub(super) index_of: Vec<u32>,
+    pub index_of: Vec<u32>,
     /// Clusters, as ranges of particles.
-    pub(super) clusters: Partition,
+    pub clusters: Partition,
     /// Connected components, as ranges of clusters.
-    pub(super) pieces: Vec<Range<usize>>,
+    pub pieces: Vec<Range<usize>>,
 }
 
-impl Order {
+impl ClusterOrder {
     /// The order for particles at `points`, joined by `springs`.
-    pub(super) fn new(points: &[DVec3], springs: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
+    pub fn new(points: &[DVec3], springs: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
         let roots = pieces(points.len(), springs.clone());
         // Pieces by their lowest particle, particles within a piece by index.
         let mut caller_of: Vec<u32> = (0..points.len() as u32).collect();
@@ -140,7 +141,7 @@ fn halve(points: &[DVec3], particles: &mut [u32], clusters: usize, base: usize, 
 }
 
 /// Partitions `items` so that the `middle` lowest along the longest side of their bounding box come first.
-pub(super) fn split(points: &[DVec3], items: &mut [u32], middle: usize) {
+pub fn split(points: &[DVec3], items: &mut [u32], middle: usize) {
     let mut low = DVec3::repeat(f64::INFINITY);
     let mut high = -low;
     for item in items.iter() {
@@ -153,23 +154,6 @@ pub(super) fn split(points: &[DVec3], items: &mut [u32], middle: usize) {
             points[*a as usize][axis].total_cmp(&points[*b as usize][axis]).then(a.cmp(b))
         });
     }
-}
-
-/// For each particle, the lowest one of its connected component.
-pub(super) fn pieces(count: usize, springs: impl Iterator<Item = [u32; 2]>) -> Vec<u32> {
-    fn root(parents: &mut [u32], mut particle: u32) -> u32 {
-        while parents[particle as usize] != particle {
-            parents[particle as usize] = parents[parents[particle as usize] as usize];
-            particle = parents[particle as usize];
-        }
-        particle
-    }
-    let mut parents: Vec<u32> = (0..count as u32).collect();
-    for ends in springs {
-        let [a, b] = ends.map(|end| root(&mut parents, end));
-        parents[a.max(b) as usize] = a.min(b);
-    }
-    (0..count as u32).map(|particle| root(&mut parents, particle)).collect()
 }
 
 #[cfg(test)]
@@ -186,7 +170,7 @@ mod tests {
     fn clusters_are_compact_and_of_equal_size() {
         let points = grid(16);
         let line = (1..points.len() as u32).map(|i| [i - 1, i]);
-        let order = Order::new(&points, line);
+        let order = ClusterOrder::new(&points, line);
         assert_eq!(order.pieces.len(), 1);
         let clusters = &order.clusters;
         assert!((30..45).contains(&clusters.len()), "{} clusters", clusters.len());
@@ -206,7 +190,7 @@ mod tests {
         // Even particles are all connected, odd ones in pairs.
         let even = (2..216).step_by(2).map(|i| [i - 2, i]);
         let pairs = (1..216).step_by(4).map(|i| [i, i + 2]);
-        let order = Order::new(&points, even.chain(pairs));
+        let order = ClusterOrder::new(&points, even.chain(pairs));
         assert_eq!(order.pieces.len(), 1 + 54);
         for (index, caller) in order.caller_of.iter().enumerate() {
             assert_eq!(order.index_of[*caller as usize] as usize, index);
@@ -221,7 +205,7 @@ mod tests {
             (0..16 * 400).map(|i| DVec3::new(f64::from(i / 16), f64::from(i % 4), f64::from(i / 4 % 4))).collect();
         let springs = (0..points.len() as u32).flat_map(|i| [[i, i + 1], [i, i + 4], [i, i + 16]]);
         let inside = springs.filter(|ends| (ends[1] as usize) < points.len());
-        let order = Order::new(&points, inside.clone());
+        let order = ClusterOrder::new(&points, inside.clone());
         let cluster = |particle: u32| {
             let index = order.index_of[particle as usize] as usize;
             (0..order.clusters.len()).find(|cluster| order.clusters.range(*cluster).contains(&index)).unwrap()
@@ -232,7 +216,7 @@ mod tests {
 
     #[test]
     fn an_empty_body_has_no_clusters() {
-        let order = Order::new(&[], std::iter::empty());
+        let order = ClusterOrder::new(&[], std::iter::empty());
         assert_eq!((order.clusters.len(), order.pieces.len()), (0, 0));
     }
 }

@@ -1,7 +1,7 @@
 //! Fixed partitions of particles for parallel loops and sums. They do not depend on the number of threads, so neither
 //! do results.
 
-use numerics::parallel;
+use crate::parallel;
 use std::ops::Range;
 
 /// Number of particles below which threads cost more than they gain.
@@ -9,7 +9,7 @@ const WORTH_THREADS: usize = 1500;
 
 /// Consecutive ranges that start at 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Partition {
+pub struct Partition {
     /// Start of each range, and the end of the last.
     starts: Vec<usize>,
     /// Whether loops run in parallel.
@@ -17,7 +17,7 @@ pub(super) struct Partition {
 }
 
 /// Per-particle data that can be split between two particles.
-pub(super) trait SplitAt: Send + Sized {
+pub trait SplitAt: Send + Sized {
     /// The parts before and from particle `at` on.
     fn halves(self, at: usize) -> (Self, Self);
 }
@@ -35,19 +35,19 @@ impl SplitAt for () {
 }
 
 /// A slice with a variable number of entries for each particle.
-pub(super) struct RaggedSlice<'a, T> {
+pub struct RaggedSlice<'a, T> {
     starts: &'a [u32],
     data: &'a mut [T],
 }
 
 impl<'a, T> RaggedSlice<'a, T> {
     /// `data` with the entries of each particle from its start to the next one's.
-    pub(super) fn new(starts: &'a [u32], data: &'a mut [T]) -> Self {
+    pub fn new(starts: &'a [u32], data: &'a mut [T]) -> Self {
         Self { starts, data }
     }
 
     /// The entries of each particle, in order.
-    pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = &mut [T]> {
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut [T]> {
         let mut left = &mut *self.data;
         self.starts.windows(2).map(move |ends| {
             let (mine, rest) = std::mem::take(&mut left).split_at_mut((ends[1] - ends[0]) as usize);
@@ -87,46 +87,53 @@ impl<A: SplitAt, B: SplitAt, C: SplitAt, D: SplitAt> SplitAt for (A, B, C, D) {
 
 impl Partition {
     /// Ranges that begin at `starts`, whose last element is the end.
-    pub(super) fn new(starts: Vec<usize>) -> Self {
+    pub fn new(starts: Vec<usize>) -> Self {
         let parallel = starts.last().is_some_and(|end| *end >= WORTH_THREADS);
         Self { starts, parallel }
     }
 
     /// Ranges of `size` out of `len` items, the last one shorter; `weight` is the cost of an item relative to that of
     /// a particle.
-    pub(super) fn even(len: usize, size: usize, weight: usize) -> Self {
+    pub fn even(len: usize, size: usize, weight: usize) -> Self {
         let mut starts: Vec<usize> = (0..len).step_by(size).collect();
         starts.push(len);
         Self { starts, parallel: len.saturating_mul(weight) >= WORTH_THREADS }
     }
 
     /// Whether loops run in parallel.
-    pub(super) fn is_parallel(&self) -> bool {
+    pub fn is_parallel(&self) -> bool {
         self.parallel
     }
 
     /// Number of ranges.
-    pub(super) fn len(&self) -> usize {
+    #[inline]
+    pub fn len(&self) -> usize {
         self.starts.len().saturating_sub(1)
     }
 
+    /// Whether there are no ranges.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     /// One range.
-    pub(super) fn range(&self, part: usize) -> Range<usize> {
+    #[inline]
+    pub fn range(&self, part: usize) -> Range<usize> {
         self.starts[part]..self.starts[part + 1]
     }
 
     /// Evaluates `work` for each range with its part of `data`.
-    pub(super) fn map<D: SplitAt, R: Send + Default>(&self, data: D, work: impl Fn(usize, D) -> R + Sync) -> Vec<R> {
+    pub fn map<D: SplitAt, R: Send + Default>(&self, data: D, work: impl Fn(usize, D) -> R + Sync) -> Vec<R> {
         self.map_dyn(data, &work)
     }
 
     /// The sum of `work` over all ranges, in order.
-    pub(super) fn sum<D: SplitAt>(&self, data: D, work: impl Fn(usize, D) -> f64 + Sync) -> f64 {
+    pub fn sum<D: SplitAt>(&self, data: D, work: impl Fn(usize, D) -> f64 + Sync) -> f64 {
         self.map(data, work).into_iter().fold(0.0, |sum, part| sum + part)
     }
 
     /// Runs `work` for each range with its part of `data`.
-    pub(super) fn for_each<D: SplitAt>(&self, data: D, work: impl Fn(usize, D) + Sync) {
+    pub fn for_each<D: SplitAt>(&self, data: D, work: impl Fn(usize, D) + Sync) {
         self.map(data, work);
     }
 

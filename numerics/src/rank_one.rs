@@ -4,14 +4,14 @@
 //! term, for g·p, and by particle, for Σ g (g·p). Nothing is scattered, so the order of every sum is fixed. Stored in
 //! f32: rigid motions are resisted only to 1e-7.
 
-use super::partition::{Partition, RaggedSlice};
-use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
+use crate::partition::{Partition, RaggedSlice};
+use crate::vector::{DVec3, Vec3, to_f32, to_f64};
 
 /// Rank-one terms, stored by term and by particle.
 #[derive(Clone, Debug, Default)]
-pub(super) struct RankOneTerms {
+pub struct RankOneTerms {
     /// Whether they are ignored.
-    pub(super) idle: bool,
+    pub idle: bool,
     /// Start of each term's entries.
     starts: Vec<u32>,
     /// Particle of each entry.
@@ -36,7 +36,7 @@ struct At {
 
 impl RankOneTerms {
     /// Sets the particles of each term, whose entries begin at `starts`, for a body of `count` particles.
-    pub(super) fn set_topology(&mut self, count: usize, starts: &[u32], particles: &[u32], partition: Partition) {
+    pub fn set_topology(&mut self, count: usize, starts: &[u32], particles: &[u32], partition: Partition) {
         self.starts.clear();
         self.particles.clear();
         self.at_starts.clear();
@@ -71,37 +71,38 @@ impl RankOneTerms {
     }
 
     /// Whether there are no terms to apply.
-    pub(super) fn is_empty(&self) -> bool {
+    #[inline]
+    pub fn is_empty(&self) -> bool {
         self.idle || self.at_starts.is_empty()
     }
 
     /// Number of terms.
-    pub(super) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         self.change.len()
     }
 
     /// Range of a term's entries.
-    pub(super) fn row(&self, row: usize) -> std::ops::Range<usize> {
+    pub fn row(&self, row: usize) -> std::ops::Range<usize> {
         self.starts[row] as usize..self.starts[row + 1] as usize
     }
 
     /// The particles of a term.
-    pub(super) fn particles(&self, row: usize) -> &[u32] {
+    pub fn particles(&self, row: usize) -> &[u32] {
         &self.particles[self.row(row)]
     }
 
     /// The particles and vectors of a term.
-    pub(super) fn entries(&self, row: usize) -> impl Iterator<Item = (usize, DVec3)> {
+    pub fn entries(&self, row: usize) -> impl Iterator<Item = (usize, DVec3)> {
         self.row(row).map(|entry| (self.particles[entry] as usize, to_f64(self.along[entry])))
     }
 
     /// The terms in fixed parts; `None` without terms to apply.
-    pub(super) fn partition(&self) -> Option<&Partition> {
+    pub fn partition(&self) -> Option<&Partition> {
         self.partition.as_ref().filter(|_| !self.is_empty())
     }
 
     /// Sets the vectors: √`weights` of the term times the entry's gradient.
-    pub(super) fn set(&mut self, weights: &[f64], gradients: &[DVec3], clusters: &Partition) {
+    pub fn set(&mut self, weights: &[f64], gradients: &[DVec3], clusters: &Partition) {
         if self.is_empty() {
             return;
         }
@@ -123,7 +124,7 @@ impl RankOneTerms {
     }
 
     /// Computes g·p of each term, for [`RankOneTerms::push`].
-    pub(super) fn measure(&mut self, p: &[DVec3]) {
+    pub fn measure(&mut self, p: &[DVec3]) {
         if self.is_empty() {
             return;
         }
@@ -140,14 +141,14 @@ impl RankOneTerms {
 
     /// Σ g·(g·p) at `particle`.
     #[inline(always)]
-    pub(super) fn push(&self, particle: usize) -> DVec3 {
+    pub fn push(&self, particle: usize) -> DVec3 {
         let mine = &self.at[self.at_starts[particle] as usize..self.at_starts[particle + 1] as usize];
         mine.iter().fold(DVec3::zeros(), |sum, at| sum + to_f64(at.along) * self.change[at.row as usize])
     }
 
     /// Adds `weight` times the diagonal block of `particle` to `block`, of the terms before `end`.
     #[inline(always)]
-    pub(super) fn add_block(&self, particle: usize, weight: f64, end: usize, block: &mut [f64; 6]) {
+    pub fn add_block(&self, particle: usize, weight: f64, end: usize, block: &mut [f64; 6]) {
         let mine = &self.at[self.at_starts[particle] as usize..self.at_starts[particle + 1] as usize];
         for at in mine.iter().take_while(|at| (at.row as usize) < end) {
             add_square(block, to_f64(at.along), weight);
@@ -156,7 +157,7 @@ impl RankOneTerms {
 
     /// Σ of `values` (by term) times `gradients` (by entry): a force on `particle`.
     #[inline(always)]
-    pub(super) fn gather(&self, particle: usize, values: &[f64], gradients: &[DVec3]) -> DVec3 {
+    pub fn gather(&self, particle: usize, values: &[f64], gradients: &[DVec3]) -> DVec3 {
         let mine = &self.at[self.at_starts[particle] as usize..self.at_starts[particle + 1] as usize];
         mine.iter().fold(DVec3::zeros(), |sum, at| sum + gradients[at.entry as usize] * values[at.row as usize])
     }
@@ -164,7 +165,7 @@ impl RankOneTerms {
 
 /// Adds s·v vᵀ to a symmetric block, stored as xx, xy, xz, yy, yz, zz.
 #[inline(always)]
-pub(super) fn add_square(block: &mut [f64; 6], v: DVec3, s: f64) {
+pub fn add_square(block: &mut [f64; 6], v: DVec3, s: f64) {
     block[0] += s * v.x * v.x;
     block[1] += s * v.x * v.y;
     block[2] += s * v.x * v.z;

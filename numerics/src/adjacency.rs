@@ -1,29 +1,32 @@
 //! Incident springs of each particle. A spring within a cluster is listed once, at its first end; one between two
 //! clusters at both ends. Each cluster can then be computed on its own, and most springs are visited only once.
 
-use super::partition::Partition;
+use crate::partition::Partition;
 
 /// A spring as seen from one of its ends.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Incident {
-    pub(super) other: u32,
-    pub(super) spring: u32,
+pub struct Incident {
+    /// Its other end.
+    pub other: u32,
+    /// Index of the spring.
+    pub spring: u32,
 }
 
 /// The springs of each particle: first those within its cluster to later particles, then all that lead to other
 /// clusters.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Adjacency {
+pub struct Adjacency {
     /// Index of the first entry of each particle, and the number of entries at the end.
-    pub(super) starts: Vec<u32>,
+    pub starts: Vec<u32>,
     /// Index of the first entry that leads to another cluster.
     middles: Vec<u32>,
-    pub(super) incident: Vec<Incident>,
+    /// The springs of all particles, in order.
+    pub incident: Vec<Incident>,
 }
 
 impl Adjacency {
     /// The adjacency of springs with these ends.
-    pub(super) fn new(clusters: &Partition, ends: &[[u32; 2]]) -> Self {
+    pub fn new(clusters: &Partition, ends: &[[u32; 2]]) -> Self {
         let mut cluster = Vec::new();
         for index in 0..clusters.len() {
             cluster.extend(clusters.range(index).map(|_| index));
@@ -52,7 +55,7 @@ impl Adjacency {
     /// Splits `all`, which has one element for each entry, into those of `particle` within its cluster and those to
     /// other clusters.
     #[inline(always)]
-    pub(super) fn of<'a, T>(&self, particle: usize, all: &'a [T]) -> [&'a [T]; 2] {
+    pub fn of<'a, T>(&self, particle: usize, all: &'a [T]) -> [&'a [T]; 2] {
         let [start, middle, end] =
             [self.starts[particle], self.middles[particle], self.starts[particle + 1]].map(|at| at as usize);
         [&all[start..middle], &all[middle..end]]
