@@ -110,7 +110,7 @@ impl Stepper<'_> {
 
     /// The largest error of the speed of a piece in contact by a step from `start` to `end`, a root mean square over its
     /// particles, relative to the speed that it would have if all its energy, with what its dashpots took, were kinetic.
-    /// `errors` are those of positions.
+    /// `errors` are those of positions. What is pinned does not bounce.
     pub(super) fn impact_error(
         &self,
         [start, end]: [&Kinematics; 2],
@@ -118,8 +118,8 @@ impl Stepper<'_> {
         errors: &[DVec3],
         h: f64,
     ) -> f64 {
-        /// Speeds below this fraction of what gravity gives in a frame are not resolved.
-        const SLOW: f64 = 0.5;
+        /// Speeds below what gravity gives in this many frames are not resolved: what rests, or is rolled, does not bounce.
+        const SLOW: f64 = 3.0;
         let body = self.context.body;
         let layout = &self.solver.layout;
         // The squared speed of what each piece touches.
@@ -156,7 +156,9 @@ impl Stepper<'_> {
             let wrong = 4.0 * wrong / (mass * h * h);
             if wrong > 0.0 { (wrong / scale).sqrt() } else { 0.0 }
         };
-        let pieces = body.order.pieces.iter().enumerate().filter(|piece| touched[piece.0] >= 0.0);
-        pieces.map(of_piece).fold(0.0, f64::max)
+        let is_held = |piece: &std::ops::Range<usize>| self.context.external.held[piece.clone()].contains(&true);
+        let pieces = body.order.pieces.iter().enumerate();
+        let free = pieces.filter(|(index, piece)| touched[*index] >= 0.0 && !is_held(piece));
+        free.map(of_piece).fold(0.0, f64::max)
     }
 }
