@@ -1,5 +1,6 @@
 //! The foundation of all kernels: vectors, lanes, SIMD paths, trigonometry, random numbers, noise, ramps, trees of
-//! triangles, of points and of moving boxes, closest points, crossing times, partitions, factored matrices and shapes. Plain slices in, plain slices out; it knows neither nodes nor geometry.
+//! triangles, of points and of moving boxes, closest points, crossing times, partitions, factored matrices and shapes.
+//! Plain slices in, plain slices out; it knows neither nodes nor geometry.
 //!
 //! Promise: the same bits on any x86-64 or aarch64 CPU and for any number of threads. Sums have a
 //! fixed order, products and sums are never fused, transcendental functions are our own.
