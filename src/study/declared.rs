@@ -13,7 +13,7 @@ use super::bench::Subject;
 use super::knobs::Knob;
 use super::measure::Study;
 use super::norms::Norm;
-use super::outcome::{Goal, Outcome};
+use super::outcome::Goal;
 use crate::progress::Progress;
 use crate::{load, memory};
 
@@ -75,23 +75,7 @@ fn studied(node: &str) -> (f64, String) {
     let mut study = Study::new(&subject, knobs, Goal::None, &graph, &folder.path().join("x.study"), Some(1));
     assert!(!study.measure().unwrap(), "not interrupted");
     let found = study.finish().unwrap();
-    let outcome = Outcome {
-        graph: "x.json".into(),
-        output: "x".into(),
-        norm: subject.norm.clone(),
-        unit: "m",
-        frames: Vec::new(),
-        knobs: found.knobs,
-        reference: found.stored.reference,
-        why: found.stored.why,
-        floor: found.stored.floor,
-        is_beyond: found.stored.is_beyond,
-        rounding: found.stored.rounding,
-        runs: found.stored.runs,
-        front: Vec::new(),
-        pick: None,
-        goal: Goal::None,
-    };
+    let outcome = found.outcome(subject.norm.clone());
     let slope = &outcome.slopes()[0];
     (slope.measured, slope.describe())
 }

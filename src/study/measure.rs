@@ -8,8 +8,8 @@ use engine::graph::Graph;
 use super::bench::{Cooked, Cost, Reference, Run, Stop, Subject, set_of};
 use super::direction::{self, End};
 use super::knobs::Knob;
-use super::norms::{Errors, Statistic};
-use super::outcome::Goal;
+use super::norms::{Errors, Norm, Statistic};
+use super::outcome::{Goal, Outcome};
 use super::search::{self, Point, Target};
 use super::store::{Store, Stored};
 use crate::failure::Failure;
@@ -61,6 +61,30 @@ pub(super) struct Study<'a> {
 pub(super) struct Found {
     pub(super) knobs: Vec<Knob>,
     pub(super) stored: Stored,
+}
+
+impl Found {
+    /// What was found in a norm; the caller names graph, output, unit, frames and goal.
+    pub(super) fn outcome(self, norm: Norm) -> Outcome {
+        let Self { knobs, stored } = self;
+        Outcome {
+            graph: String::new(),
+            output: String::new(),
+            norm,
+            unit: "m",
+            frames: Vec::new(),
+            knobs,
+            reference: stored.reference,
+            why: stored.why,
+            floor: stored.floor,
+            is_beyond: stored.is_beyond,
+            rounding: stored.rounding,
+            runs: stored.runs,
+            front: Vec::new(),
+            pick: None,
+            goal: Goal::None,
+        }
+    }
 }
 
 impl<'a> Study<'a> {

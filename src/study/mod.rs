@@ -248,23 +248,8 @@ pub fn run(args: &StudyArgs) -> Result<(), Failure> {
             "note: the first value of `{key}` counts as the best, as its result is larger than the last's or takes longer; if it is not, give them in the other order"
         );
     }
-    let mut outcome = Outcome {
-        graph: load::graph_name(&args.graph),
-        output: name,
-        norm,
-        unit,
-        frames,
-        knobs: found.knobs,
-        reference: found.stored.reference,
-        why: found.stored.why,
-        floor: found.stored.floor,
-        is_beyond: found.stored.is_beyond,
-        rounding: found.stored.rounding,
-        runs: found.stored.runs,
-        front: Vec::new(),
-        pick: None,
-        goal,
-    };
+    let graph_name = load::graph_name(&args.graph);
+    let mut outcome = Outcome { graph: graph_name, output: name, unit, frames, goal, ..found.outcome(norm) };
     outcome.judge();
     write(args, &paths, &outcome, json_file, Source { bytes: &bytes, graph: &graph, fixed: &fixed })?;
     if outcome.pick.is_none() {
