@@ -56,6 +56,43 @@ impl Axis {
     }
 }
 
+/// Height of the band below a logarithmic axis of errors in which those of 0 are drawn, pixels.
+const ZERO_BAND: f64 = 40.0;
+
+/// The axis of errors: logarithmic down to the floor, on which everything below it is drawn. Without a floor an error may be
+/// 0, which has no logarithm: it is drawn in a band of its own.
+struct Errors {
+    /// None where all errors are 0.
+    positive: Option<Axis>,
+    floor: f64,
+    zero: bool,
+}
+
+impl Errors {
+    fn new(errors: &[f64], floor: f64) -> Self {
+        let [_, top, _, bottom] = AREA;
+        let zero = floor <= 0.0 && errors.contains(&0.0);
+        let low = if zero { bottom - ZERO_BAND } else { bottom };
+        let drawn = errors.iter().map(|error| error.max(floor)).chain([floor]);
+        let positive: Vec<f64> = drawn.filter(|error| *error > 0.0).collect();
+        let positive = (!positive.is_empty()).then(|| Axis::new(&positive, [low, top]));
+        Self { positive, floor, zero }
+    }
+
+    fn at(&self, error: f64) -> f64 {
+        match &self.positive {
+            Some(axis) if error.max(self.floor) > 0.0 => axis.at(error.max(self.floor)),
+            _ => AREA[3] - ZERO_BAND / 2.0,
+        }
+    }
+
+    /// Where lines are drawn and numbered.
+    fn ticks(&self) -> Vec<f64> {
+        let zero = self.zero.then_some(0.0);
+        zero.into_iter().chain(self.positive.iter().flat_map(Axis::ticks)).collect()
+    }
+}
+
 /// The text of an SVG file.
 struct Svg(String);
 
@@ -80,24 +117,14 @@ pub(super) fn svg(outcome: &Outcome) -> String {
     let done: Vec<(usize, f64, f64)> = (0..outcome.runs.len())
         .filter_map(|run| Some((run, outcome.ms(run)?.max(1e-6), outcome.error(run)?)))
         .collect();
-    // What is below the floor is drawn on it; without a floor, an error of 0 is drawn below all others.
-    let least = done.iter().map(|one| one.2).filter(|error| *error > 0.0).fold(f64::INFINITY, f64::min);
-    let lowest = if floor > 0.0 {
-        floor
-    } else if least.is_finite() {
-        least / 3.0
-    } else {
-        1e-9
-    };
-    let drawn = |error: f64| error.max(lowest);
-    let [left, top, right, bottom] = AREA;
+    let [left, _, right, bottom] = AREA;
     let times: Vec<f64> = done.iter().map(|one| one.1).collect();
-    let mut errors: Vec<f64> = done.iter().map(|one| drawn(one.2)).collect();
-    errors.push(lowest);
-    if let Goal::Tolerance(tolerance) = outcome.goal {
-        errors.push(tolerance);
-    }
-    let (x, y) = (Axis::new(&times, [left, right]), Axis::new(&errors, [bottom, top]));
+    let tolerance = match outcome.goal {
+        Goal::Tolerance(tolerance) => Some(tolerance),
+        Goal::Budget(_) | Goal::None => None,
+    };
+    let errors: Vec<f64> = done.iter().map(|one| one.2).chain(tolerance).collect();
+    let (x, y) = (Axis::new(&times, [left, right]), Errors::new(&errors, floor));
     let mut svg = Svg(format!(
         r##"<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="system-ui, Helvetica, Arial, sans-serif" font-size="13" fill="#222">
 <rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>
@@ -123,15 +150,13 @@ pub(super) fn svg(outcome: &Outcome) -> String {
     let front: Vec<String> = outcome
         .front
         .iter()
-        .filter_map(|run| {
-            Some(format!("{:.1},{:.1}", x.at(outcome.ms(*run)?.max(1e-6)), y.at(drawn(outcome.error(*run)?))))
-        })
+        .filter_map(|run| Some(format!("{:.1},{:.1}", x.at(outcome.ms(*run)?.max(1e-6)), y.at(outcome.error(*run)?))))
         .collect();
     let _ =
         writeln!(svg.0, r##"<polyline points="{}" fill="none" stroke="#1f5fa8" stroke-width="2"/>"##, front.join(" "));
     let mut labels: Vec<[f64; 4]> = Vec::new();
     for (run, ms, error) in &done {
-        let at = [x.at(*ms), y.at(drawn(*error))];
+        let at = [x.at(*ms), y.at(*error)];
         let on_front = outcome.front.contains(run);
         let style = match on_front {
             true => r##"fill="#1f5fa8" stroke="#fff""##,
@@ -151,7 +176,7 @@ pub(super) fn svg(outcome: &Outcome) -> String {
 }
 
 /// Title, grid, axes and their names.
-fn frame(svg: &mut Svg, outcome: &Outcome, x: &Axis, y: &Axis) {
+fn frame(svg: &mut Svg, outcome: &Outcome, x: &Axis, y: &Errors) {
     let [left, top, right, bottom] = AREA;
     for at in x.ticks() {
         svg.line([x.at(at), top], [x.at(at), bottom], r##"stroke="#e6e8eb""##);
@@ -160,6 +185,13 @@ fn frame(svg: &mut Svg, outcome: &Outcome, x: &Axis, y: &Axis) {
     for at in y.ticks() {
         svg.line([left, y.at(at)], [right, y.at(at)], r##"stroke="#e6e8eb""##);
         svg.text([left - 8.0, y.at(at) + 4.0], r##"text-anchor="end" fill="#555" font-size="12""##, &short(at));
+    }
+    if y.zero {
+        svg.line(
+            [left, bottom - ZERO_BAND],
+            [right, bottom - ZERO_BAND],
+            r##"stroke="#9aa3ad" stroke-dasharray="2 4""##,
+        );
     }
     let (width, height) = (right - left, bottom - top);
     let _ = writeln!(
@@ -187,7 +219,7 @@ fn knob_names(outcome: &Outcome) -> String {
 }
 
 /// The tolerance or the budget.
-fn goal(svg: &mut Svg, outcome: &Outcome, x: &Axis, y: &Axis) {
+fn goal(svg: &mut Svg, outcome: &Outcome, x: &Axis, y: &Errors) {
     let [left, top, right, bottom] = AREA;
     let style = r##"stroke="#c2410c" stroke-dasharray="6 4""##;
     match outcome.goal {
@@ -321,6 +353,19 @@ mod tests {
             assert!(ticks.len() >= least && ticks.len() <= 12, "{numbers:?}: {ticks:?}");
             assert!(ticks.iter().all(|tick| (0.0..=100.0).contains(&axis.at(*tick))));
         }
+    }
+
+    #[test]
+    fn an_error_of_zero_is_drawn_below_all_others() {
+        let [_, top, _, bottom] = AREA;
+        let some = Errors::new(&[1e-3, 0.0, 1e-6], 0.0);
+        assert!(top < some.at(1e-3) && some.at(1e-3) < some.at(1e-6));
+        assert!(some.at(1e-6) < bottom - ZERO_BAND && bottom - ZERO_BAND < some.at(0.0) && some.at(0.0) < bottom);
+        assert_eq!(some.ticks()[0], 0.0);
+        let none = Errors::new(&[0.0, 0.0], 0.0);
+        assert_eq!((none.ticks(), none.at(0.0)), (vec![0.0], some.at(0.0)));
+        let floored = Errors::new(&[1e-3, 0.0], 1e-5);
+        assert!(!floored.zero && floored.at(0.0) == floored.at(1e-5) && floored.at(0.0) < bottom);
     }
 
     #[test]
