@@ -5,7 +5,7 @@ pub(crate) struct Case {
     pub(crate) name: &'static str,
     /// The nodes of the graph, as a graph file has them.
     pub(crate) nodes: &'static [&'static str],
-    /// Cooked beforehand, and held in memory: what the node reads that does not change with the frame.
+    /// What the node reads that does not change with the frame: it is cooked in a run of its own, whose count is taken off.
     pub(crate) before: &'static [&'static str],
     /// The node, or `"node.port"`.
     pub(crate) output: &'static str,
