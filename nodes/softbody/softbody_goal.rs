@@ -13,7 +13,7 @@
 use bodies::goals::{GoalLimits, GoalShape, HeldBody, goal_shape};
 use engine::prelude::*;
 
-use crate::shared::attributes::{ALWAYS, GOAL_FRAME, GOAL_HOLD, GOAL_START, GOAL_STRENGTH, SURFACE_POINT};
+use crate::shared::attributes::{ALWAYS, GOAL_FRAME, GOAL_HOLD, GOAL_SHARE, GOAL_START, GOAL_STRENGTH, SURFACE_POINT};
 
 inputs! { INPUTS:
     BODY: Input = Input::one("body", Kind::Tets,
@@ -32,10 +32,11 @@ params! { PARAMS:
          the shape from wherever it is, to reach it at `frame`. By default a goal pulls from the start of the \
          simulation, or once the hold of the goal before it is over.")
         .unit(Unit::Frame).fixed();
-    STRENGTH: Param<f32> = Param::float("strength", 100.0,
+    STRENGTH: Param<Maskable> = Param::maskable("strength", 100.0,
         "How strongly the body is pulled towards the shape: acceleration per distance. 0 does not pull. About 200 · \
          stiffness ÷ (density · size²) brings the body to within 1 % of its size: 4e4 for dough of 5e3 Pa that is 0.16 \
-         m across, 1e3 if it is 1 m across.")
+         m across, 1e3 if it is 1 m across. A mask on the points of `body` directs a part of it: where it is 0, \
+         particles are free.")
         .unit(Unit::PerSecondSquared).at_least(0.0).soft(0.0, 1e5);
     HOLD: Param<f32> = Param::float("hold", 0.0,
         "How long the body is held in the shape before it moves on to the next goal or is released.")
@@ -51,7 +52,7 @@ metrics! { METRICS:
         .warn_above(0.0, "The shape cannot be reached without turning parts of the body inside out. Look for places \
             where its surface crosses itself or bends sharply, and smooth them.");
     VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume of the body in the shape, relative to its own.");
-    IDLE = Metric::new("idle", Unit::None, "1 where `strength` is 0, so that the goal does not pull; 0 elsewhere.")
+    IDLE = Metric::new("idle", Unit::None, "1 where `strength` is 0 everywhere, so that the goal does not pull; 0 elsewhere.")
         .warn_always_above(0.0, "With a `strength` of 0 the body is not pulled towards this shape. Raise `strength`, or \
             remove the goal.");
     LATE = Metric::new("late_start", Unit::None, "1 where `start_frame` is not before `frame`; 0 elsewhere.")
@@ -78,24 +79,29 @@ pub(crate) static NODE: Node = Node::new(
 .params(PARAMS)
 .outputs(&[&GOAL])
 .reads(&[&P, &SURFACE_POINT])
-.writes(&[&P, &GOAL_FRAME, &GOAL_START, &GOAL_STRENGTH, &GOAL_HOLD])
+.writes(&[&P, &GOAL_FRAME, &GOAL_START, &GOAL_STRENGTH, &GOAL_SHARE, &GOAL_HOLD])
 .metrics(METRICS);
 
 fn cook(cx: &Cx) -> Result<Outputs> {
     let (body, shape) = (cx.part(BODY), cx.part(SHAPE));
+    let strength = cx.mask(STRENGTH, body)?;
     let rows = surface(body, cx.input(BODY).mesh(), shape)?;
     cx.check_cancelled()?;
     let held = HeldBody { points: body.positions(), tets: body.tet_corners(), rows, shape: shape.positions() };
     // Cached, as keyed strengths cook every frame.
     let found = body.kept(Asked::of(body, shape), || Ok(goal_shape(&held, GoalLimits::default())))?;
     publish(cx, &found);
-    cx.publish(IDLE, if cx.get(STRENGTH) > 0.0 { 0.0 } else { 1.0 });
+    let pulls = strength.value > 0.0 && strength.mask.is_none_or(|mask| mask.iter().any(|share| *share > 0.0));
+    cx.publish(IDLE, if pulls { 0.0 } else { 1.0 });
     cx.publish(LATE, if cx.get(START_FRAME) < cx.get(FRAME) { 0.0 } else { 1.0 });
     let mut out = body.clone();
     out.set(P, found.points.clone())?;
     out.set(GOAL_FRAME, vec![cx.get(FRAME)])?;
     out.set(GOAL_START, vec![cx.get(START_FRAME)])?;
-    out.set(GOAL_STRENGTH, vec![cx.get(STRENGTH)])?;
+    out.set(GOAL_STRENGTH, vec![strength.value])?;
+    if let Some(mask) = strength.mask {
+        out.set(GOAL_SHARE, mask.to_vec())?;
+    }
     out.set(GOAL_HOLD, vec![cx.get(HOLD)])?;
     Ok(GOAL.with(Geometry::from(out)))
 }

@@ -49,8 +49,13 @@ pub(crate) fn cook(nodes: &str, outputs: &[&str], frames: i64) -> Frames {
 
 /// As [`cook`], of an example's nodes; and all metrics.
 pub(crate) fn cook_file(example: &str, outputs: &[&str], frames: i64) -> (Frames, Metrics) {
+    cook_file_with(example, outputs, frames, &[])
+}
+
+/// The same with other values of some params.
+pub(crate) fn cook_file_with(example: &str, outputs: &[&str], frames: i64, set: &[(&str, &str)]) -> (Frames, Metrics) {
     let path = graphs().join(example).join(example).with_extension("json");
-    let graph = load(&fs::read_to_string(path).unwrap(), outputs, &[]).unwrap_or_else(|fault| panic!("{fault}"));
+    let graph = load(&fs::read_to_string(path).unwrap(), outputs, set).unwrap_or_else(|fault| panic!("{fault}"));
     cook_graph(&graph, frames)
 }
 

@@ -1,6 +1,6 @@
 //! `graphs/egg_crack`.
 
-use crate::cooked::cook_file;
+use crate::cooked::cook_file_with;
 use crate::measure::{distance, points, volume};
 use engine::geometry::Geometry;
 
@@ -26,7 +26,8 @@ fn near(tet: &[[f64; 3]; 4], p: &[f64; 3]) -> bool {
 
 #[test]
 fn an_egg_drapes_over_the_rim_with_its_yolk_inside() {
-    let (frames, metrics) = cook_file("egg_crack", &["egg.tets", "white", "yolk", "pins", "bowl"], 60);
+    let coarse = [("outside.divisions", "8"), ("cavity.divisions", "5"), ("ball.divisions", "5")];
+    let (frames, metrics) = cook_file_with("egg_crack", &["egg.tets", "white", "yolk", "pins", "bowl"], 60, &coarse);
     let [eggs, whites, yolks, pins] = [&frames[0], &frames[1], &frames[2], &frames[3]];
     let of = |geometry: &Geometry| geometry.tets().unwrap().tet_corners().to_vec();
     let (white_tets, yolk_tets) = (of(&whites[0]), of(&yolks[0]));

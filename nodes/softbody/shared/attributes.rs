@@ -15,6 +15,8 @@ pub(crate) const FILL: Attr<f32> = Attr::element("fill");
 pub(crate) const GOAL_FRAME: Attr<f32> = Attr::once("goal_frame");
 /// Of a goal: how strongly the body is pulled, 1/s² (acceleration per distance).
 pub(crate) const GOAL_STRENGTH: Attr<f32> = Attr::once("goal_strength");
+/// On points of a goal: the share of that strength with which the particle is pulled; missing where all are pulled alike.
+pub(crate) const GOAL_SHARE: Attr<f32> = Attr::point("goal_share");
 /// Of a goal: the frame from which the body is pulled.
 pub(crate) const GOAL_START: Attr<f32> = Attr::once("goal_start");
 /// Of a goal: number of frames for which the body is held.

@@ -4,11 +4,13 @@
 //! goal with a frame from which it pulls leaves the body free until then, and takes it up wherever it is.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use bodies::mass_spring;
 use bodies::tets::bounds;
 use engine::prelude::*;
+use numerics::masked::Masked;
 use numerics::vector::{DVec3, to_f64};
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +19,7 @@ use super::{
     DOUBLED_GOALS, DOUBLED_GOALS_WIRE, EARLY_GOALS, EARLY_GOALS_WIRE, GOAL_MISS, GOAL_MISS_BODY, GOAL_MISS_GOAL,
     GoalOn, IDLE_GOALS, IDLE_GOALS_WIRE,
 };
-use crate::shared::attributes::{ALWAYS, GOAL_FRAME, GOAL_HOLD, GOAL_START, GOAL_STRENGTH};
+use crate::shared::attributes::{ALWAYS, GOAL_FRAME, GOAL_HOLD, GOAL_SHARE, GOAL_START, GOAL_STRENGTH};
 
 /// A goal of a body.
 struct GoalKey<'a> {
@@ -26,7 +28,8 @@ struct GoalKey<'a> {
     frame: f64,
     /// From when on it pulls.
     start: f64,
-    strength: f64,
+    /// For each point of the body.
+    strength: Masked<'a, f64>,
     hold: f64,
     positions: &'a [[f32; 3]],
 }
@@ -75,12 +78,22 @@ enum Origin<'a> {
     Found(&'a [[f64; 3]]),
 }
 
-/// The target of a body at a time: an interpolation between two shapes, and how strongly it pulls.
+/// The target of a body at a time: an interpolation between two shapes, and between the strengths of two goals.
 struct GoalSample<'a> {
     from: Origin<'a>,
     to: &'a GoalKey<'a>,
     share: f64,
-    strength: f64,
+    /// That of the goal before, if the body comes from its shape.
+    strength_before: Option<Masked<'a, f64>>,
+}
+
+impl GoalSample<'_> {
+    /// How strongly a point of the body is pulled, 1/s².
+    fn strength(&self, point: usize) -> f64 {
+        let to = self.to.strength.at(point).max(0.0);
+        let from = self.strength_before.map_or(to, |before| before.at(point).max(0.0));
+        from + (to - from) * self.share
+    }
 }
 
 /// Critical damping of the motion towards a goal, 1/s.
@@ -113,7 +126,7 @@ impl<'a> Goals<'a> {
                 index,
                 frame: number(GOAL_FRAME)?,
                 start: number(GOAL_START).unwrap_or(f64::from(ALWAYS)),
-                strength: number(GOAL_STRENGTH)?.max(0.0),
+                strength: Masked { value: number(GOAL_STRENGTH)?, mask: shape.get(GOAL_SHARE) },
                 hold: number(GOAL_HOLD)?.max(0.0),
                 positions: shape.positions(),
             };
@@ -151,23 +164,33 @@ impl<'a> Goals<'a> {
         for (wire, particles) in self.setup.wires.iter().enumerate() {
             let Some(now) = self.sample(wire, times[1]) else { continue };
             let before = self.sample(wire, times[0]);
-            let damping = damping(now.strength);
-            for (point, particle) in particles.clone().enumerate().filter(|(_, particle)| self.is_pulled(*particle, on))
-            {
+            for (point, particle) in self.pulled(particles, &now, on) {
+                let strength = now.strength(point);
                 let to = self.place(&now, particle, point);
                 let from = before.as_ref().map_or(to, |before| self.place(before, particle, point));
                 let between = [from.into(), to.into()];
                 out.push(mass_spring::GoalSpring {
                     particle: particle as u32,
                     between,
-                    strength: now.strength,
-                    damping,
+                    strength,
+                    damping: damping(strength),
                 });
             }
         }
     }
 
-    fn is_pulled(&self, particle: usize, on: GoalOn) -> bool {
+    /// The points of a wire's body that are pulled, and their particles.
+    fn pulled<'b>(
+        &'b self,
+        particles: &Range<usize>,
+        now: &'b GoalSample<'_>,
+        on: GoalOn,
+    ) -> impl Iterator<Item = (usize, usize)> + 'b {
+        let free = |point: usize| now.to.strength.mask.is_some() && now.strength(point) <= 0.0;
+        particles.clone().enumerate().filter(move |(point, particle)| self.is_on(*particle, on) && !free(*point))
+    }
+
+    fn is_on(&self, particle: usize, on: GoalOn) -> bool {
         match on {
             GoalOn::Interior => !self.setup.outer[particle],
             GoalOn::Surface => self.setup.outer[particle],
@@ -190,19 +213,19 @@ impl<'a> Goals<'a> {
         let (before, next) = self.around(wire, frame);
         let held = |at: &&GoalKey<'_>| frame <= at.released() && next.is_none_or(|next| frame < next.frame);
         if let Some(to) = before.filter(held) {
-            return Some(GoalSample { from: Origin::Rest, to, share: 1.0, strength: to.strength });
+            return Some(GoalSample { from: Origin::Rest, to, share: 1.0, strength_before: None });
         }
         let to = next?;
-        let (from, since, strength) = match before {
+        let (from, since, strength_before) = match before {
             _ if to.waits_for(before, self.start) => {
                 let start = self.history.starts.get(&to.index)?;
-                (Origin::Found(&start.positions), start.frame, to.strength)
+                (Origin::Found(&start.positions), start.frame, None)
             }
-            Some(before) => (Origin::Goal(before.positions), before.released(), before.strength),
-            None => (Origin::Rest, self.start, to.strength),
+            Some(before) => (Origin::Goal(before.positions), before.released(), Some(before.strength)),
+            None => (Origin::Rest, self.start, None),
         };
         let share = if to.frame > since { ((frame - since) / (to.frame - since)).clamp(0.0, 1.0) } else { 1.0 };
-        Some(GoalSample { from, to, share, strength: strength + (to.strength - strength) * share })
+        Some(GoalSample { from, to, share, strength_before })
     }
 
     /// The target positions of all particles at a frame, NaN for particles without a goal; `None` if there are no
@@ -238,10 +261,15 @@ impl<'a> Goals<'a> {
         self.passed(frame).any(|(_, _, step)| share_of_step(step, whole, frames).is_some())
     }
 
+    /// All goals, with their body's wire.
+    fn all(&self) -> impl Iterator<Item = (usize, &GoalKey<'a>)> {
+        self.of.iter().enumerate().flat_map(|(wire, keys)| keys.iter().map(move |key| (wire, key)))
+    }
+
     /// Goals passed by `frame`, with the number of steps since, the step that passed them included.
     fn passed(&self, frame: f64) -> impl Iterator<Item = (usize, &GoalKey<'_>, f64)> {
-        let all = self.of.iter().enumerate().flat_map(|(wire, keys)| keys.iter().map(move |key| (wire, key)));
-        all.map(move |(wire, key)| (wire, key, frame - key.frame.ceil().max(self.start + 1.0) + 1.0))
+        self.all()
+            .map(move |(wire, key)| (wire, key, frame - key.frame.ceil().max(self.start + 1.0) + 1.0))
             .filter(|(_, _, step)| *step >= 1.0)
     }
 
@@ -258,7 +286,7 @@ impl<'a> Goals<'a> {
     /// Notes how near bodies are to the goals whose shape they should have at a frame.
     fn compare(&mut self, frame: f64, on: GoalOn, positions: &[[f64; 3]]) {
         for body in 0..self.of.len() {
-            let reached = |now: &GoalSample<'_>| now.share >= 1.0 && now.strength > 0.0;
+            let reached = |now: &GoalSample<'_>| now.share >= 1.0 && now.to.strength.value > 0.0;
             let Some(goal) = self.sample(body, frame).filter(reached).map(|now| now.to.index) else { continue };
             let [sum, count] = self.distances(body, frame, on, positions);
             let [low, high] = bounds(self.setup.rest[self.setup.wires[body].clone()].iter().copied());
@@ -293,9 +321,7 @@ impl<'a> Goals<'a> {
     /// Sum of the distances of a wire's pulled particles from their targets, and their number.
     fn distances(&self, wire: usize, frame: f64, on: GoalOn, positions: &[[f64; 3]]) -> [f64; 2] {
         let Some(now) = self.sample(wire, frame) else { return [0.0; 2] };
-        let particles = self.setup.wires[wire].clone().enumerate();
-        let pulled = particles.filter(|(_, particle)| self.is_pulled(*particle, on));
-        pulled.fold([0.0; 2], |[sum, count], (point, particle)| {
+        self.pulled(&self.setup.wires[wire], &now, on).fold([0.0; 2], |[sum, count], (point, particle)| {
             let to = self.place(&now, particle, point);
             [sum + (to - DVec3::from(positions[particle])).norm(), count + 1.0]
         })
@@ -303,9 +329,12 @@ impl<'a> Goals<'a> {
 
     /// The goals that have no particle to pull, by index of their wire.
     fn idle(&self, on: GoalOn) -> Vec<usize> {
-        let empty = |wire: &usize| !self.setup.wires[*wire].clone().any(|particle| self.is_pulled(particle, on));
+        let pulls = |wire: usize, key: &GoalKey<'_>| {
+            let share = |point: usize| key.strength.factor(point) > 0.0;
+            self.setup.wires[wire].clone().enumerate().any(|(point, particle)| self.is_on(particle, on) && share(point))
+        };
         let mut idle: Vec<usize> =
-            (0..self.of.len()).filter(empty).flat_map(|wire| self.of[wire].iter().map(|key| key.index)).collect();
+            self.all().filter(|(wire, key)| !pulls(*wire, key)).map(|(_, key)| key.index).collect();
         idle.sort_unstable();
         idle
     }

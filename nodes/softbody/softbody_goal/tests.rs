@@ -54,7 +54,7 @@ fn it_conforms() {
 #[test]
 fn the_interior_follows_an_affine_shape_exactly() {
     let map: Map = |[x, y, z]| [1.0 + 0.5 * x - y, 0.25 * z + 2.0 * y, 0.75 * z + 0.125 * x];
-    let out = making(body(), moved(ball(), map)).set(FRAME, 24.0).set(STRENGTH, 50.0).set(HOLD, 3.0).cook();
+    let out = making(body(), moved(ball(), map)).set(FRAME, 24.0).set(STRENGTH, 50.0.into()).set(HOLD, 3.0).cook();
     let goal = out.part(Kind::Tets);
     for (rest, point) in body().tets().unwrap().positions().iter().zip(goal.positions()) {
         let at = map(rest.map(f64::from));
@@ -143,12 +143,28 @@ fn a_body_without_a_valid_surface_point_is_refused() {
 #[test]
 fn a_keyed_strength_changes_only_the_strength() {
     let shape = moved(ball(), |[x, y, z]| [x + 0.3 * y * y, y, z]);
-    let keyed = making(body(), shape).keyed(STRENGTH, &[(1.0, 10.0), (5.0, 30.0)]);
+    let keyed = making(body(), shape).keyed(STRENGTH, &[(1.0, 10.0.into()), (5.0, 30.0.into())]);
     let frames = keyed.frames([1, 3]);
     let strength = |k: usize| frames[k].part(Kind::Tets).get(GOAL_STRENGTH).unwrap()[0];
     assert_eq!((strength(0), strength(1)), (10.0, 20.0));
     assert_eq!(frames[0].part(Kind::Tets).positions(), frames[1].part(Kind::Tets).positions());
     assert_eq!(frames[0].metrics["cg"], frames[1].metrics["cg"]);
+}
+
+/// A mask on the body's points becomes each particle's share of the strength; without one there is no such attribute.
+#[test]
+fn a_masked_strength_is_a_share_for_each_particle() {
+    let masked = |share: fn(&[f32; 3]) -> f32| {
+        let mut body = body();
+        let shares: Vec<f32> = body.tets().unwrap().positions().iter().map(share).collect();
+        body.part_mut(Kind::Tets).unwrap().set(Attr::<f32>::point("core"), shares.clone()).unwrap();
+        (making(body, ball()).set(STRENGTH, Maskable { value: 50.0, attribute: Some("core".into()) }).cook(), shares)
+    };
+    let (upper, shares) = masked(|p| if p[1] > 0.0 { 0.5 } else { 0.0 });
+    assert_eq!(upper.part(Kind::Tets).get(GOAL_SHARE), Some(&shares[..]));
+    assert_eq!(upper.part(Kind::Tets).get(GOAL_STRENGTH), Some(&[50.0][..]));
+    assert_eq!((upper.metrics["idle"], masked(|_| 0.0).0.metrics["idle"]), (0.0, 1.0));
+    assert_eq!(making(body(), ball()).cook().part(Kind::Tets).get(GOAL_SHARE), None);
 }
 
 #[test]

@@ -70,6 +70,42 @@ fn a_goal_pulls_from_its_start_frame_on() {
     }
 }
 
+/// Where a particle's share of the strength is 0, it is as free as without a goal: apart from a body of two separate cubes, of
+/// which a goal pulls one.
+#[test]
+fn a_goal_pulls_the_particles_that_have_a_share_of_its_strength() {
+    let two = || {
+        let (mut points, mut tets) = (Vec::new(), Vec::new());
+        for apart in [0.0, 3.0] {
+            let first = points.len() as u32;
+            points.extend(cube().positions().iter().map(|p| [p[0] + apart, p[1], p[2]]));
+            tets.extend(cube().tet_corners().iter().map(|tet| tet.map(|corner| corner + first)));
+        }
+        Component::tets(tets, points).unwrap()
+    };
+    let half = two().point_count() / 2;
+    let goal = |shares: [f32; 2]| {
+        let mut goal = goal_along(two(), 0.2, &[(GOAL_FRAME, 9.0), (GOAL_HOLD, 20.0)]);
+        let rows = (0..2 * half).map(|row| shares[row / half]).collect();
+        goal.part_mut(Kind::Tets).unwrap().set(GOAL_SHARE, rows).unwrap();
+        goal
+    };
+    let cooked = |shares: [f32; 2]| {
+        let soft = simulating(two()).set(GOAL_ON, GoalOn::All).set(GRAVITY, [0.0; 3]).set(RESET_TO_GOALS, 0.0);
+        soft.input(GOALS, goal(shares)).frames(1..=12)
+    };
+    let one = cooked([0.0, 1.0]);
+    let (rest, last) = (one[0].mesh().positions(), one[11].mesh().positions());
+    for (from, to) in rest.iter().zip(last) {
+        let asked = if from[0] < 1.5 { 0.0 } else { 0.2 };
+        let limit = if asked > 0.0 { 2e-3 } else { 1e-6 };
+        assert!((to[0] - from[0] - asked).abs() < limit, "{from:?} moved to {to:?}");
+    }
+    assert!(one[11].metrics["goal_distance"] < 2e-3, "the mean is over the particles that are pulled");
+    assert_eq!(one[11].metrics["idle_goals"], 0.0);
+    assert_eq!(cooked([0.0, 0.0])[11].metrics["idle_goals"], 1.0);
+}
+
 #[test]
 fn between_its_hold_and_the_start_of_the_next_goal_a_body_is_free() {
     let first = goal_along(cube(), 0.1, &[(GOAL_FRAME, 4.0), (GOAL_HOLD, 4.0)]);
