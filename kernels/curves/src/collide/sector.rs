@@ -63,7 +63,7 @@ impl Sector {
             return;
         }
         let (heights, flat) = self.seen(corners);
-        let Some([p, q]) = slice(&heights, 0.0, |k| flat(k)) else { return };
+        let Some([p, q]) = slice(&heights, 0.0, flat) else { return };
         // A point at radius r that lies `back` beyond the ray at angle α is past α by asin(back/r) ≥ back/r.
         let side = |p: P2| until[0] * p[1] - until[1] * p[0];
         // More than the rounding error of the ends of its parts, relative to `p` and `q`.
