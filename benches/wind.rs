@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use engine::cook::{Delivered, Engine, Report, Settings};
-use engine::geometry::{Component, Geometry};
+use engine::geometry::{Component, Geometry, Kind, P};
 use engine::graph::{Body, Graph, probe};
 use engine::plan::Request;
 use engine::time::Frame;
@@ -57,6 +57,8 @@ const NO_COLLIDERS: Chain<'_> = Chain { name: "gusts + wind + jiggle", shielding
 enum Fur {
     /// Number of curves and CVs per curve, on a sphere.
     Sphere(usize, usize),
+    /// The same on a sphere through which a swelling runs, so that skin and curves move at every frame.
+    Swelling(usize, usize),
     Bear,
 }
 
@@ -68,6 +70,7 @@ fn main() {
     let sphere = Fur::Sphere(10_000, 5);
     let small = [FULL, LOFT, STILL, NO_COLLISION, NO_COLLIDERS, SMOOTH].map(|chain| (chain, graph(chain, sphere, 24)));
     let bear = graph(FULL, Fur::Bear, 24);
+    let moving = graph(FULL, Fur::Swelling(10_000, 5), 24);
     let larger =
         [(100_000, 5), (10_000, 32)].map(|(curves, cvs)| (curves, cvs, graph(FULL, Fur::Sphere(curves, cvs), 6)));
     let largest = graph(FULL, Fur::Sphere(1_000_000, 5), 6);
@@ -84,6 +87,7 @@ fn main() {
         }
         figures.add("full chain, 10,000 × 5, frame 24 alone", 1, cook(&two, &small[0].1, 24..=24).cooking);
         figures.add("full chain, bear (10,275 × 5)", 24, cook(&two, &bear, 1..=24).cooking);
+        figures.add("full chain, skin that moves, 10,000 × 5", 24, cook(&two, &moving, 1..=24).cooking);
         for (curves, cvs, graph) in &larger {
             figures.add(format!("full chain, {curves} × {cvs}"), 6, cook(&two, graph, 1..=6).cooking);
         }
@@ -207,11 +211,36 @@ fn graph(chain: Chain<'_>, fur: Fur, last: i64) -> Graph {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("graphs/bear_wind");
     let mut graph =
         Graph::load(&text, &folder, convect::CATALOGUE, &[], &probe).unwrap_or_else(|faults| panic!("{}", faults[0]));
-    if let Fur::Sphere(curves, cvs) = fur {
-        give(&mut graph, "fur", upright(curves, cvs));
-        give(&mut graph, "skin", sphere());
+    match fur {
+        Fur::Sphere(curves, cvs) => {
+            give(&mut graph, "fur", upright(curves, cvs));
+            give(&mut graph, "skin", sphere());
+        }
+        Fur::Swelling(curves, cvs) => {
+            give_moving(&mut graph, "fur", upright(curves, cvs), Kind::Curves, last);
+            give_moving(&mut graph, "skin", sphere(), Kind::Mesh, last);
+        }
+        Fur::Bear => {}
     }
     graph
+}
+
+/// Replaces a node by a geometry that swells; its points are computed before anything is timed.
+fn give_moving(graph: &mut Graph, id: &str, geometry: Geometry, kind: Kind, last: i64) {
+    let rest = geometry.part(kind).expect("a part").positions();
+    let swollen = |frame: i64| -> Vec<[f32; 3]> {
+        let grown = |p: [f32; 3]| 1.0 + 0.05 * libm::sin(3.0 * f64::from(p[1]) - 0.3 * frame as f64) as f32;
+        rest.iter().map(|p| p.map(|x| x * grown(*p))).collect()
+    };
+    let frames: Vec<Vec<[f32; 3]>> = (1..=last).map(swollen).collect();
+    let at = move |frame: Frame| {
+        let mut geometry = geometry.clone();
+        let index = (frame.number() as i64).clamp(1, last) - 1;
+        geometry.part_mut(kind).expect("a part").set(P, frames[index as usize].clone()).expect("points");
+        geometry
+    };
+    let node = graph.nodes.iter_mut().find(|node| &*node.id == id).expect("a node");
+    node.body = Body::Given { at: Arc::new(at), moves: true };
 }
 
 /// Replaces a node by a geometry.

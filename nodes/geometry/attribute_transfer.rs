@@ -38,9 +38,10 @@ params! { PARAMS:
 const OUT: Output = Output::like("geometry", &GEOMETRY, "The geometry with the attributes.");
 
 metrics! { METRICS:
-    UNREACHED = Metric::new("unreached", Unit::None, "Rows without anything of `source` within `radius`.")
-        .warn_above(0.0, "Nothing of `source` is within `radius` of these rows. They keep the values that they had; where the \
-            attribute is new, they get its neutral value. Raise `radius`, or set it to 0 to take the nearest value at any distance.");
+    UNREACHED = Metric::new("unreached", Unit::None,
+        "Points, or elements, that have nothing of `source` within `radius`; counted once for each attribute.")
+        .warn_above(0.0, "So many points or elements have nothing of `source` within `radius`. They keep their values; a new \
+            attribute is 0 there, an `envelope` 1. Raise `radius`, or set it to 0 to take the nearest value at any distance.");
 }
 
 pub(crate) static NODE: Node = Node::new(

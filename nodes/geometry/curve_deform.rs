@@ -68,10 +68,10 @@ metrics! { METRICS:
         .warn_above(0.0, "These curves follow no guide: they only move with the skin, if one is wired. Raise `radius`, set it to 0 \
             to let every curve follow its nearest guides, or grow guides near them.");
     OFF_SKIN = Metric::new("guides_off_skin", Unit::None,
-        "Guides whose roots do not move with the skin. One counts if its root misses the place to which the skin carries it \
-         by more than half of that displacement, and by more than a hundredth of the guide's length.")
-        .warn_above(0.0, "`skin` moves, but the roots of these guides stay behind, and take the roots of curves off the skin with \
-            them. Carry the guides along first: put Curve_Attach, with the same `rest_skin` and `skin`, before what bends them.");
+        "Guides that do not move with the skin. The skin carries a root from one point to another. A guide counts if its root \
+         is off the second point by more than half the distance of the two, and by more than 0.01 of the guide's length.")
+        .warn_above(0.0, "`skin` moves and these guides do not, so the curves that follow them leave the skin. Put Curve_Attach, \
+            with the same skins, after `rest_guides` and before the nodes that bend the guides.");
     FAR_ROOTS = Metric::new("far_roots", Unit::None,
         "Curves and guides whose roots are farther from the skin at rest than they are long.")
         .warn_above(0.0, "These curves are farther from `rest_skin` than they are long, so they probably grew on another \

@@ -24,7 +24,7 @@ use crate::shared::group::{self, Group};
 use crate::shared::gust_control;
 use curves::clumps::drawn;
 use curves::gusts::{
-    Control, Draw, Gust, GustMasks, Gusts, Influence, Plane, Sphere, bounds, evaluate, scale, sideways,
+    Control, Draw, Gust, GustMasks, Gusts, Influence, Plane, Sphere, bounds, evaluate, scale, scaled, sideways,
 };
 use engine::prelude::*;
 use numerics::ramp::Ramp;
@@ -172,31 +172,30 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
     let wanted = cx.wants(GUST);
     let (envelope, gust) = match (felt.values, &group) {
         (None, _) => {
-            let ones = || vec![1.0; curves.point_count()];
+            let ones = || Column::new(vec![1.0_f32; curves.point_count()]);
             (incoming.is_none().then(ones), wanted.then(ones))
         }
         (Some(values), None) => {
-            let mut envelope = values.clone();
-            if let Some(incoming) = incoming.filter(|_| wanted) {
-                scale(&mut envelope, incoming);
-            }
-            (Some(envelope), wanted.then_some(values))
+            let envelope = incoming.filter(|_| wanted).map(|incoming| Column::new(scaled(&values, incoming)));
+            let values = Column::new(values);
+            // Without an incoming envelope both are one array.
+            (Some(envelope.unwrap_or_else(|| values.clone())), wanted.then_some(values))
         }
         (Some(values), Some(group)) => {
             let (envelope, gust) = on_group(group, &curves, values);
-            (Some(envelope), Some(gust))
+            (Some(Column::new(envelope)), Some(Column::new(gust)))
         }
     };
     cx.publish(REACHED_POINTS, felt.reached as f64);
     if let Some(envelope) = envelope {
-        curves.set(ENVELOPE, envelope)?;
+        curves.set_column(Owner::Point, ENVELOPE.name, envelope)?;
     }
     if let Some(gust) = gust.filter(|_| wanted) {
-        curves.set(GUST, gust)?;
+        curves.set_column(Owner::Point, GUST.name, gust)?;
     }
     if !shears && cx.needs(GUST_DIR) && curves.get(GUST_DIR).is_none() {
-        let none = vec![[0.0; 3]; curves.point_count()];
-        curves.set(GUST_DIR, none)?;
+        let none = no_sides(cx.part(CURVES));
+        curves.set_column(Owner::Point, GUST_DIR.name, none)?;
     }
     if let Some(sides) = felt.sides {
         let mut all = curves.get(GUST_DIR).map_or_else(|| vec![[0.0; 3]; curves.point_count()], <[[f32; 3]]>::to_vec);
@@ -215,6 +214,12 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
         curves.set(GUST_DIR, all)?;
     }
     Ok(OUT.with(curves))
+}
+
+/// A `gust_dir` of 0: frames whose curves do not move share one array, kept with them.
+fn no_sides(curves: &Component) -> Column {
+    struct Zeros(Column);
+    curves.derived(|curves| Zeros(Column::new(vec![[0.0_f32; 3]; curves.point_count()]))).0.clone()
 }
 
 /// Largest part of `gust_dir` along an axis: the wind itself, of length 1, is then below rounding.
@@ -303,7 +308,9 @@ struct Sent {
 }
 
 fn sent(cx: &FrameCx) -> Sent {
-    let Some(bounds) = bounds(cx.part_at_start(CURVES).positions()) else { return Sent::default() };
+    struct Around(Option<[[f32; 3]; 2]>);
+    let around = cx.part_at_start(CURVES).derived(|start| Around(bounds(start.positions())));
+    let Some(bounds) = around.0 else { return Sent::default() };
     let ends = |range: Param<Span>| {
         let Span { low, high } = cx.get(range);
         [low, high]

@@ -207,9 +207,12 @@ fn lost_at(cv: usize, shielded: f32, amount: &Masked<'_, f32>) -> f32 {
 
 /// The share of the wind that each CV loses.
 fn shelter(curves: &Component, shielded: &[f32], amount: Masked<'_, f32>) -> Vec<f32> {
-    let mut lost = vec![0.0; curves.point_count()];
+    let mut lost = Vec::with_capacity(curves.point_count());
     for (cvs, shielded) in curves.runs().ranges().zip(shielded) {
-        lost[cvs.clone()].iter_mut().zip(cvs).for_each(|(lost, cv)| *lost = lost_at(cv, *shielded, &amount));
+        match amount.mask {
+            None => lost.resize(cvs.end, lost_at(cvs.start, *shielded, &amount)),
+            Some(_) => lost.extend(cvs.map(|cv| lost_at(cv, *shielded, &amount))),
+        }
     }
     lost
 }
@@ -218,8 +221,13 @@ fn shelter(curves: &Component, shielded: &[f32], amount: Masked<'_, f32>) -> Vec
 fn scaled(curves: &Component, shielded: &[f32], amount: Masked<'_, f32>) -> Vec<f32> {
     let mut envelope = curves.get(ENVELOPE).map_or_else(|| vec![1.0; curves.point_count()], <[f32]>::to_vec);
     for (cvs, shielded) in curves.runs().ranges().zip(shielded) {
-        let rows = envelope[cvs.clone()].iter_mut().zip(cvs);
-        rows.for_each(|(envelope, cv)| *envelope *= 1.0 - lost_at(cv, *shielded, &amount));
+        if amount.mask.is_none() {
+            let left = 1.0 - lost_at(cvs.start, *shielded, &amount);
+            envelope[cvs].iter_mut().for_each(|envelope| *envelope *= left);
+        } else {
+            let rows = envelope[cvs.clone()].iter_mut().zip(cvs);
+            rows.for_each(|(envelope, cv)| *envelope *= 1.0 - lost_at(cv, *shielded, &amount));
+        }
     }
     envelope
 }

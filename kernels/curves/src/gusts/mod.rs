@@ -209,9 +209,19 @@ impl<'a> Prepared<'a> {
 /// Multiplies values by those incoming, of which below 0 or NaN counts as 0; none is above 1 then.
 pub fn scale(values: &mut [f32], incoming: &[f32]) {
     for (value, incoming) in values.iter_mut().zip(incoming) {
-        *value *= at_least_0(*incoming);
-        *value = if *value > 1.0 { 1.0 } else { *value };
+        *value = scaled_by(*value, *incoming);
     }
+}
+
+/// [`scale()`] of a copy.
+pub fn scaled(values: &[f32], incoming: &[f32]) -> Vec<f32> {
+    values.iter().zip(incoming).map(|(value, incoming)| scaled_by(*value, *incoming)).collect()
+}
+
+#[inline(always)]
+fn scaled_by(value: f32, incoming: f32) -> f32 {
+    let product = value * at_least_0(incoming);
+    if product > 1.0 { 1.0 } else { product }
 }
 
 /// The number; below 0 or NaN counts as 0, infinity as the largest, whose product with 0 is 0.

@@ -262,30 +262,51 @@ fn shape(curves: &CurveLanes, states: &[CvState], blend: Masked<'_, f32>, base: 
         let ratio = F64x16::from_fn(|lane| (long.0[lane] / now.0[lane]).sqrt());
         let scale = F64x16::from_fn(|lane| if now.0[lane] > 0.0 { ratio.0[lane] } else { 0.0 });
         let straight = F64x16::from_fn(|lane| if now.0[lane] > 0.0 { 0.0 } else { 1.0 });
-        moved = axes(|axis| {
-            F64x16::from_fn(|lane| {
-                let rest = rest[axis].0[lane];
-                let end = scale.0[lane] * swung[axis].0[lane] + straight.0[lane] * rest;
-                moved[axis].0[lane] + (end - rest)
-            })
-        });
+        // Not `axes`: closures as long as this are not inlined, and are compiled without the path's instructions.
+        let ends = Ends { rest: &rest, swung: &swung, scale: &scale, straight: &straight };
+        moved = [ends.moved(&moved, 0), ends.moved(&moved, 1), ends.moved(&moved, 2)];
         let distance = squares(&moved);
         farthest = F64x16::from_fn(|lane| {
             let distance = if (step as u32) < curves.count[lane] { distance.0[lane] } else { 0.0 };
             if distance > farthest.0[lane] { distance } else { farthest.0[lane] }
         });
-        let written = axes(|axis| {
-            F32x16::from_fn(|lane| {
-                let (target, moved) = (state.target[axis].0[lane], moved[axis].0[lane]);
-                let to = (f64::from(target) + moved) as f32;
-                // Unmoved coordinates are not summed: −0 + 0 would lose its sign.
-                if moved == 0.0 { target } else { to }
-            })
-        });
+        let written = [written(state, &moved, 0), written(state, &moved, 1), written(state, &moved, 2)];
         curves.write(step, &written, base, out);
         (target, shown) = (&state.target, next);
     }
     farthest.0.into_iter().fold(0.0, f64::max)
+}
+
+/// Segments as they are at their targets, and as they swing: those are scaled to their lengths, or, without a direction,
+/// kept as at their targets.
+struct Ends<'a> {
+    rest: &'a [F64x16; 3],
+    swung: &'a [F64x16; 3],
+    scale: &'a F64x16,
+    straight: &'a F64x16,
+}
+
+impl Ends<'_> {
+    /// The displacement of the segments' ends along an axis, given that of their starts.
+    #[inline(always)]
+    fn moved(&self, before: &[F64x16; 3], axis: usize) -> F64x16 {
+        F64x16::from_fn(|lane| {
+            let rest = self.rest[axis].0[lane];
+            let end = self.scale.0[lane] * self.swung[axis].0[lane] + self.straight.0[lane] * rest;
+            before[axis].0[lane] + (end - rest)
+        })
+    }
+}
+
+/// The coordinates of CVs along an axis, displaced from their targets.
+#[inline(always)]
+fn written(state: &CvState, moved: &[F64x16; 3], axis: usize) -> F32x16 {
+    F32x16::from_fn(|lane| {
+        let (target, moved) = (state.target[axis].0[lane], moved[axis].0[lane]);
+        let to = (f64::from(target) + moved) as f32;
+        // Unmoved coordinates are not summed: −0 + 0 would lose its sign.
+        if moved == 0.0 { target } else { to }
+    })
 }
 
 /// Squared lengths.

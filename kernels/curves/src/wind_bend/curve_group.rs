@@ -31,18 +31,26 @@ pub(super) struct Scratch {
 }
 
 kernel! {
-    /// Writes the bent curves of `group` to `out`, which holds just their points.
+    /// Writes the bent curves of `group` to `out`, which holds just their points; returns the largest values over them and
+    /// those `before`.
     pub(super) fn bend_group(
         bend: &Bend<'_>,
         group: &CurveGroup<'_>,
+        before: &Reached,
         scratch: &mut Scratch,
         out: &mut [Vec3],
     ) -> Reached = body;
 }
 
 #[inline(always)]
-fn body(bend: &Bend<'_>, group: &CurveGroup<'_>, scratch: &mut Scratch, out: &mut [Vec3]) -> Reached {
-    let Some(curves) = Curves::of(group) else { return Reached::default() };
+fn body(
+    bend: &Bend<'_>,
+    group: &CurveGroup<'_>,
+    reached: &Reached,
+    scratch: &mut Scratch,
+    out: &mut [Vec3],
+) -> Reached {
+    let Some(curves) = Curves::of(group) else { return *reached };
     let unit = curves.load(group.points, scratch);
     let length = measure(curves.longest, &unit, scratch);
     let (points, arc) = (&scratch.points, &scratch.arc);
@@ -70,7 +78,7 @@ fn body(bend: &Bend<'_>, group: &CurveGroup<'_>, scratch: &mut Scratch, out: &mu
         curves.write(step + 1, &written, out);
         before = written;
     }
-    tally.reached(&length)
+    tally.reached(&length, reached)
 }
 
 /// Position of each lane's curve in the points.
@@ -87,6 +95,7 @@ pub(super) struct Curves {
 
 impl Curves {
     /// `None` if the group has no CVs.
+    #[inline(always)]
     fn of(group: &CurveGroup<'_>) -> Option<Self> {
         let base = group.starts[0] as usize;
         let mut curves = Self { base, first: [base; LANES], last: [base; LANES], count: [0; LANES], longest: 0 };

@@ -98,12 +98,18 @@ pub struct Bent {
 #[derive(Clone, Copy, Default)]
 struct Reached {
     max_angle: f32,
+    /// The squared tangent of half the largest angle.
+    ratio: f32,
     length_error: f32,
 }
 
 impl Reached {
     fn max(self, other: Self) -> Self {
-        Self { max_angle: self.max_angle.max(other.max_angle), length_error: self.length_error.max(other.length_error) }
+        Self {
+            max_angle: self.max_angle.max(other.max_angle),
+            ratio: self.ratio.max(other.ratio),
+            length_error: self.length_error.max(other.length_error),
+        }
     }
 }
 
@@ -144,7 +150,7 @@ pub fn bend_on(path: Path, starts: &[u32], points: &[[f32; 3]], bend: &Bend<'_>)
             let end = task.end.min(first + LANES);
             let (mine, rest) = out.split_at_mut((starts[end] - starts[first]) as usize);
             let group = CurveGroup { first, starts: &starts[first..=end], points };
-            reached = reached.max(bend_group(path, bend, &group, &mut scratch, mine));
+            reached = bend_group(path, bend, &group, &reached, &mut scratch, mine);
             out = rest;
         }
         reached

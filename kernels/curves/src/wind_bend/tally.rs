@@ -5,6 +5,12 @@ use numerics::lanes::{F32x16, LANES, Lanes, get};
 use numerics::trig;
 use numerics::vector;
 
+/// A squared tangent of half an angle this many times another belongs to an angle that is smaller after rounding too.
+const CLEARLY_LESS: f32 = 1.0 - 1e-5;
+
+/// Above this squared tangent angles are so close to π that rounding may make those equal whose tangents differ.
+const COARSE: f32 = 100.0;
+
 /// Running measures of sixteen curves, in units.
 pub(super) struct Tally {
     /// Squares of the difference and of the sum of a segment before and after, where their ratio, the squared tangent
@@ -42,9 +48,10 @@ impl Tally {
         }
     }
 
-    /// The largest over the lanes, whose curves have these lengths.
-    pub(super) fn reached(&self, length: &F32x16) -> Reached {
-        let (mut difference, mut sum, mut length_error) = (0.0, 1.0, 0.0f32);
+    /// The largest over the lanes, whose curves have these lengths, and over those `before`.
+    #[inline(always)]
+    pub(super) fn reached(&self, length: &F32x16, before: &Reached) -> Reached {
+        let (mut difference, mut sum, mut length_error) = (0.0, 1.0, before.length_error);
         for lane in 0..LANES {
             let change = self.largest.0[lane].max(self.total.0[lane].abs());
             if length.0[lane] > 0.0 {
@@ -54,6 +61,12 @@ impl Tally {
                 (difference, sum) = (self.difference.0[lane], self.sum.0[lane]);
             }
         }
-        Reached { max_angle: 2.0 * trig::atan2(difference.sqrt(), sum.sqrt()), length_error }
+        // Most groups turn clearly less than one before, so that their angle is not needed.
+        let ratio = difference / sum;
+        if ratio < CLEARLY_LESS * before.ratio && ratio < COARSE {
+            return Reached { length_error, ..*before };
+        }
+        let angle = 2.0 * trig::atan2(difference.sqrt(), sum.sqrt());
+        Reached { max_angle: before.max_angle.max(angle), ratio: before.ratio.max(ratio), length_error }
     }
 }
