@@ -3,7 +3,7 @@
 use numerics::vector::Vec3;
 
 use crate::rows::{Cell, CellRows, RowSpan};
-use crate::velocity::within;
+use crate::velocity::{FaceFields, within};
 
 /// Where in its cell the value of a field lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,8 +54,12 @@ impl Corners {
     /// The eight values, x fastest.
     #[inline(always)]
     pub fn values<T: Copy>(&self, field: &[T]) -> [T; 8] {
-        let [a, b, c, d] = self.at.map(|at| at as usize);
-        [field[a], field[a + 1], field[b], field[b + 1], field[c], field[c + 1], field[d], field[d + 1]]
+        let pair = |at: u32| {
+            let pair = &field[at as usize..at as usize + 2];
+            [pair[0], pair[1]]
+        };
+        let [[a, b], [c, d], [e, f], [g, h]] = self.at.map(pair);
+        [a, b, c, d, e, f, g, h]
     }
 
     /// The value at the point.
@@ -116,7 +120,11 @@ impl<'a> Sampler<'a> {
     /// The values around `point`, in cells; `None` where one is not stored.
     #[inline(always)]
     pub fn corners(&mut self, site: Site, point: Vec3) -> Option<Corners> {
-        let ([x, y, z], t) = split(site, point);
+        self.corners_of(site, split(site, point))
+    }
+
+    #[inline(always)]
+    fn corners_of(&mut self, site: Site, ([x, y, z], t): (Cell, Vec3)) -> Option<Corners> {
         let slot = (y & 1 | (z & 1) << 1) as usize;
         let mut window = &self.windows[site as usize][slot];
         if window.row != [y, z] || x < window.start || x >= window.end {
@@ -134,6 +142,22 @@ impl<'a> Sampler<'a> {
             Some(corners) => corners.value(field),
             None => self.value_beside(field, site, point),
         }
+    }
+
+    /// A velocity on faces at `point`, as [`Self::value`] finds each component.
+    #[inline(always)]
+    pub fn velocity(&mut self, faces: &FaceFields<f32>, point: Vec3) -> Vec3 {
+        // Between faces and between centres, along each axis.
+        let sides = [0, 1, 2].map(|axis| [0.0, 0.5].map(|offset| split_along(point[axis], offset)));
+        let mut value = |own: usize| {
+            let at = [0, 1, 2].map(|axis| sides[axis][usize::from(axis != own)]);
+            let (cell, t) = (at.map(|(cell, _)| cell), at.map(|(_, t)| t));
+            match self.corners_of(Site::FACES[own], (cell, t)) {
+                Some(corners) => corners.value(&faces[own]),
+                None => self.value_beside(&faces[own], Site::FACES[own], point),
+            }
+        };
+        [value(0), value(1), value(2)]
     }
 
     #[inline(never)]
@@ -232,15 +256,17 @@ const WHOLE: f32 = 12_582_912.0;
 #[inline(always)]
 fn split(site: Site, point: Vec3) -> (Cell, Vec3) {
     let offset = site.offset();
-    let (mut cell, mut t) = ([0; 3], [0.0; 3]);
-    for axis in 0..3 {
-        let p = within(point[axis], -FARTHEST, FARTHEST) - offset[axis];
-        // A whole p may take the cell below, with t = 1.
-        let sum = (p - 0.5) + WHOLE;
-        cell[axis] = sum.to_bits() as i32 - WHOLE.to_bits() as i32;
-        t[axis] = p - (sum - WHOLE);
-    }
-    (cell, t)
+    let at = [0, 1, 2].map(|axis| split_along(point[axis], offset[axis]));
+    (at.map(|(cell, _)| cell), at.map(|(_, t)| t))
+}
+
+/// The same along one axis.
+#[inline(always)]
+fn split_along(x: f32, offset: f32) -> (i32, f32) {
+    let p = within(x, -FARTHEST, FARTHEST) - offset;
+    // A whole p may take the cell below, with t = 1.
+    let sum = (p - 0.5) + WHOLE;
+    (sum.to_bits() as i32 - WHOLE.to_bits() as i32, p - (sum - WHOLE))
 }
 
 #[cfg(test)]
