@@ -11,8 +11,8 @@ mod sampler;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use around::Around;
 pub use advect::{Advection, Scheme, Tracer};
+pub(crate) use around::Around;
 pub use extrapolate::{extrapolate, extrapolate_first};
 pub use sampler::{Corners, Sampler, Site, trilinear};
 

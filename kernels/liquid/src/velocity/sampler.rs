@@ -105,8 +105,8 @@ const NO_WINDOW: Window = Window { row: [0; 2], start: 0, end: 0, base: [0; 4] }
 #[derive(Clone, Debug)]
 pub struct Sampler<'a> {
     rows: &'a CellRows,
-    /// For each site, one window for rows even and odd along y and z.
-    windows: [[Window; 4]; 4],
+    /// One window for each row modulo 4 along y and z: those around a point, for all sites, have different ones.
+    windows: [Window; 16],
     /// Those of `rows`, once a point far from all cells has asked for them.
     bounds: Option<(Cell, Cell)>,
 }
@@ -114,22 +114,22 @@ pub struct Sampler<'a> {
 impl<'a> Sampler<'a> {
     /// For fields on `rows`.
     pub fn new(rows: &'a CellRows) -> Self {
-        Self { rows, windows: [[NO_WINDOW; 4]; 4], bounds: None }
+        Self { rows, windows: [NO_WINDOW; 16], bounds: None }
     }
 
     /// The values around `point`, in cells; `None` where one is not stored.
     #[inline(always)]
     pub fn corners(&mut self, site: Site, point: Vec3) -> Option<Corners> {
-        self.corners_of(site, split(site, point))
+        self.corners_of(split(site, point))
     }
 
     #[inline(always)]
-    fn corners_of(&mut self, site: Site, ([x, y, z], t): (Cell, Vec3)) -> Option<Corners> {
-        let slot = (y & 1 | (z & 1) << 1) as usize;
-        let mut window = &self.windows[site as usize][slot];
+    fn corners_of(&mut self, ([x, y, z], t): (Cell, Vec3)) -> Option<Corners> {
+        let slot = (y & 3 | (z & 3) << 2) as usize;
+        let mut window = &self.windows[slot];
         if window.row != [y, z] || x < window.start || x >= window.end {
-            self.windows[site as usize][slot] = self.window([x, y, z])?;
-            window = &self.windows[site as usize][slot];
+            self.windows[slot] = self.window([x, y, z])?;
+            window = &self.windows[slot];
         }
         Some(Corners { at: window.base.map(|base| base.wrapping_add(x as u32)), t })
     }
@@ -148,16 +148,21 @@ impl<'a> Sampler<'a> {
     #[inline(always)]
     pub fn velocity(&mut self, faces: &FaceFields<f32>, point: Vec3) -> Vec3 {
         // Between faces and between centres, along each axis.
-        let sides = [0, 1, 2].map(|axis| [0.0, 0.5].map(|offset| split_along(point[axis], offset)));
-        let mut value = |own: usize| {
-            let at = [0, 1, 2].map(|axis| sides[axis][usize::from(axis != own)]);
-            let (cell, t) = (at.map(|(cell, _)| cell), at.map(|(_, t)| t));
-            match self.corners_of(Site::FACES[own], (cell, t)) {
-                Some(corners) => corners.value(&faces[own]),
-                None => self.value_beside(&faces[own], Site::FACES[own], point),
-            }
-        };
-        [value(0), value(1), value(2)]
+        let [x, y, z] = [0, 1, 2].map(|axis| split_along(point[axis], 0.0));
+        let [a, b, c] = [0, 1, 2].map(|axis| split_along(point[axis], 0.5));
+        [
+            self.component(&faces[0], Site::FaceX, [x, b, c], point),
+            self.component(&faces[1], Site::FaceY, [a, y, c], point),
+            self.component(&faces[2], Site::FaceZ, [a, b, z], point),
+        ]
+    }
+
+    #[inline(always)]
+    fn component(&mut self, field: &[f32], site: Site, [x, y, z]: [(i32, f32); 3], point: Vec3) -> f32 {
+        match self.corners_of(([x.0, y.0, z.0], [x.1, y.1, z.1])) {
+            Some(corners) => corners.value(field),
+            None => self.value_beside(field, site, point),
+        }
     }
 
     #[inline(never)]
