@@ -49,7 +49,7 @@ impl RowSpan {
     }
 }
 
-/// The longest row, in cells, that is put together from bits.
+/// The longest row, in cells, that is put together from bits: an eighth of a byte meanwhile for each cell of the smallest box.
 const MOST_BITS: i64 = 512;
 
 /// Cells that one thread tabulates, about.

@@ -93,13 +93,13 @@ mod tests {
 
     #[test]
     fn what_is_set_is_found() {
-        for ranges in
-            [vec![], vec![0..1], vec![0..192], vec![3..64, 65..66, 127..128], vec![63..65, 100..192], vec![64..128]]
-        {
+        let cases: [&[[usize; 2]]; 6] =
+            [&[], &[[0, 1]], &[[0, 192]], &[[3, 64], [65, 66], [127, 128]], &[[63, 65], [100, 192]], &[[64, 128]]];
+        for ranges in cases {
             let mut row = vec![0; 3];
-            ranges.iter().for_each(|range| set(&mut row, range.clone()));
+            ranges.iter().for_each(|[start, end]| set(&mut row, *start..*end));
             let mut found = Vec::new();
-            each_range(&row, |range| found.push(range));
+            each_range(&row, |range| found.push([range.start, range.end]));
             assert_eq!(found, ranges);
         }
     }
