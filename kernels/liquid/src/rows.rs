@@ -11,6 +11,7 @@ use std::ops::Range;
 use numerics::parallel;
 use serde::{Deserialize, Serialize};
 
+mod bits;
 mod periods;
 #[cfg(test)]
 mod tests;
@@ -47,6 +48,9 @@ impl RowSpan {
         self.start <= x && x < self.end
     }
 }
+
+/// The longest row, in cells, that is put together from bits: an eighth of a byte meanwhile for each cell of the smallest box.
+const MOST_BITS: i64 = 512;
 
 /// Cells that one thread tabulates, about.
 const TABULATED: usize = 4096;
@@ -246,6 +250,17 @@ impl CellRows {
 
     /// Those of them inside the box `low` ≤ cell < `high`; none outside it is made meanwhile.
     pub fn dilated_within(&self, by: i32, low: Cell, high: Cell) -> Self {
+        let Some((first, last)) = self.bounds() else { return Self::default() };
+        let (low, high) = (
+            [0, 1, 2].map(|axis| max(first[axis].saturating_sub(by), low[axis])),
+            [0, 1, 2].map(|axis| min(last[axis].saturating_add(by), high[axis])),
+        );
+        if (0..3).any(|axis| low[axis] >= high[axis]) {
+            return Self::default();
+        }
+        if i64::from(high[0]) - i64::from(low[0]) <= MOST_BITS {
+            return bits::dilated(self, by, low, high);
+        }
         let first = [0, 1].map(|axis| max(self.low[axis] - by, low[axis + 1]));
         let end = [0, 1].map(|axis| min(self.low[axis] + self.size[axis] + by, high[axis + 1]));
         let along_xy = Self::from_ranges([first[0], self.low[1]], [end[0] - first[0], self.size[1]], |y, z, out| {

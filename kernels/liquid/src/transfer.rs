@@ -7,7 +7,7 @@ use std::cmp::{max, min};
 
 use numerics::simd::{Path, kernel};
 
-use crate::rows::{Cell, CellRows};
+use crate::rows::{Cell, CellRows, RowSpan};
 use crate::stencil::{Run, Stencil};
 
 /// Where the values of a field are in their cells.
@@ -98,15 +98,18 @@ kernel! {
 fn restrict_body(runs: &[Run], first: usize, place: Place, fine: &CellRows, residual: &[f32], out: &mut [f32]) {
     let mut line = Vec::new();
     let [along_x, along_y, along_z] = [0, 1, 2].map(|axis| place.children(axis));
+    let weights: [f32; 16] = std::array::from_fn(|row| along_y[row % 4] * along_z[row / 4]);
+    let (mut last, mut near): (_, [&[RowSpan]; 16]) = (None, [&[]; 16]);
     for run in runs {
         let n = run.len as usize;
         let [x, y, z] = run.cell.map(|n| 2 * n - 1);
-        line.clear();
-        line.resize(2 * n + 2, 0.0);
-        for (step_z, weight_z) in (0..).zip(along_z) {
-            for (step_y, weight_y) in (0..).zip(along_y) {
-                add_row(fine, residual, [x, y + step_y, z + step_z], weight_y * weight_z, &mut line);
-            }
+        if last != Some([y, z]) {
+            last = Some([y, z]);
+            near = std::array::from_fn(|row| fine.row(y + row as i32 % 4, z + row as i32 / 4));
+        }
+        let line = zeros(&mut line, 2 * n + 2);
+        for (row, weight) in near.iter_mut().zip(weights) {
+            add_row(row, residual, x, weight, line);
         }
         let out = &mut out[run.at as usize - first..][..n];
         let [a, b, c, d] = along_x;
@@ -121,20 +124,28 @@ fn restrict_body(runs: &[Run], first: usize, place: Place, fine: &CellRows, resi
 fn interpolate_body(runs: &[Run], first: usize, from: &Interpolated<'_>, scale: &[f32], q: &mut [f32]) {
     let (mut line, mut fine_line) = (Vec::new(), Vec::new());
     let place = from.place;
+    let (mut last, mut near): (_, [(&[RowSpan], f32); 4]) = (None, [(&[], 0.0); 4]);
     for run in runs {
         let n = run.len as usize;
         let (low, odd) = (run.cell[0].div_euclid(2), run.cell[0].rem_euclid(2) as usize);
         let pairs = (odd + n).div_ceil(2);
-        line.clear();
-        line.resize(pairs + 2, 0.0);
-        for (z, weight_z) in place.parents(2, run.cell[2]) {
-            for (y, weight_y) in place.parents(1, run.cell[1]) {
-                add_row(from.rows, from.field, [low - 1, y, z], weight_y * weight_z, &mut line);
-            }
+        let [_, y, z] = run.cell;
+        if last != Some([y, z]) {
+            last = Some([y, z]);
+            let (ys, zs) = (place.parents(1, y), place.parents(2, z));
+            near = std::array::from_fn(|row| {
+                let ((y, weight_y), (z, weight_z)) = (ys[row % 2], zs[row / 2]);
+                (from.rows.row(y, z), weight_y * weight_z)
+            });
         }
-        fine_line.clear();
-        fine_line.resize(2 * pairs, 0.0);
-        let (twos, _) = fine_line.as_chunks_mut::<2>();
+        let line = zeros(&mut line, pairs + 2);
+        for (row, weight) in &mut near {
+            add_row(row, from.field, low - 1, *weight, line);
+        }
+        if fine_line.len() < 2 * pairs {
+            fine_line.resize(2 * pairs, 0.0);
+        }
+        let (twos, _) = fine_line[..2 * pairs].as_chunks_mut::<2>();
         // Weights of the coarse values before, at and after for the even and the odd fine value.
         let [even, odd_weights] = if place.is_on_faces(0) {
             [[0.0, 1.0, 0.0], [0.0, 0.5, 0.5]]
@@ -153,19 +164,34 @@ fn interpolate_body(runs: &[Run], first: usize, from: &Interpolated<'_>, scale: 
     }
 }
 
-/// `line` += `weight` · the values of the cells from `from` on along x, 0 where they are not stored.
+/// The first values of a list, which grows to hold them, all 0.
 #[inline(always)]
-fn add_row(rows: &CellRows, field: &[f32], from: Cell, weight: f32, line: &mut [f32]) {
+fn zeros(line: &mut Vec<f32>, len: usize) -> &mut [f32] {
+    if line.len() < len {
+        line.resize(len, 0.0);
+    }
+    let line = &mut line[..len];
+    line.fill(0.0);
+    line
+}
+
+/// `line` += `weight` · the values of the cells of a row from `from` on, 0 where they are not stored. Drops the spans before
+/// them from the row: calls for a row ascend.
+#[inline(always)]
+fn add_row(row: &mut &[RowSpan], field: &[f32], from: i32, weight: f32, line: &mut [f32]) {
     if weight == 0.0 {
         return;
     }
-    let end = from[0] + line.len() as i32;
-    let row = rows.row(from[1], from[2]);
-    let next = row.partition_point(|span| span.end <= from[0]);
-    for span in row[next..].iter().take_while(|span| span.start < end) {
-        let (start, end) = (max(span.start, from[0]), min(span.end, end));
+    while let Some((first, rest)) = row.split_first()
+        && first.end <= from
+    {
+        *row = rest;
+    }
+    let end = from + line.len() as i32;
+    for span in row.iter().take_while(|span| span.start < end) {
+        let (start, end) = (max(span.start, from), min(span.end, end));
         let values = &field[span.at(start)..][..(end - start) as usize];
-        let line = &mut line[(start - from[0]) as usize..][..values.len()];
+        let line = &mut line[(start - from) as usize..][..values.len()];
         for i in 0..values.len() {
             line[i] += weight * values[i];
         }

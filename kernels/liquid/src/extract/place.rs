@@ -17,13 +17,17 @@ pub(super) fn vertices(view: PhiView<'_>, cubes: &Cubes, slab: usize, project: b
     for (y, row) in cubes.rows(slab) {
         let mut blocks = RowBlocks::new(view, y, z);
         for cube in row {
-            let block = blocks.at(cube.x);
+            let corner = [cube.x, y, z].map(|n| n as f32 + 0.5);
             let walls = Walls::of(view, [cube.x, y, z]);
+            if !walls.none() && walls.are_all(cube) {
+                out.push((add(corner, [0.5; 3]), walls.outward()));
+                continue;
+            }
+            let block = blocks.at(cube.x);
             let loops = table().loops[usize::from(cube.kind)];
             for edges in &loops.edges[..usize::from(loops.count)] {
                 let crossings = Crossings::of(cube, &block, *edges, walls);
                 let (at, normal) = crossings.vertex(&block, walls, project && loops.count == 1);
-                let corner = [cube.x, y, z].map(|n| n as f32 + 0.5);
                 out.push((add(corner, at), normal));
             }
         }
@@ -44,6 +48,18 @@ impl Walls {
 
     fn none(self) -> bool {
         self.0 == [0; 3]
+    }
+
+    /// Whether all corners of a cube that are in the domain are inside, so that its surface is on walls alone.
+    fn are_all(self, cube: &Cube) -> bool {
+        let is_beyond = |corner: usize, axis: usize| self.0[axis] == 2 * (corner >> axis & 1) as i32 - 1;
+        let is_in_domain = |corner: usize| (0..3).all(|axis| !is_beyond(corner, axis));
+        (0..8).all(|corner| cube.inside(corner) == is_in_domain(corner))
+    }
+
+    /// The normal of a vertex on walls alone.
+    fn outward(self) -> Vec3 {
+        unit(self.0.map(|wall| wall as f32)).unwrap_or([0.0, 1.0, 0.0])
     }
 }
 
@@ -91,7 +107,7 @@ impl Crossings {
     #[inline]
     fn vertex(&self, block: &Block, walls: Walls, project: bool) -> (Vec3, Vec3) {
         if !self.free {
-            return (self.mean, unit(walls.0.map(|wall| wall as f32)).unwrap_or([0.0, 1.0, 0.0]));
+            return (self.mean, walls.outward());
         }
         let at = if project { newton(block, self.mean, walls) } else { self.mean };
         let (_, gradient) = cubic(block, at);

@@ -17,7 +17,7 @@ mod sides;
 mod tests;
 mod view;
 
-use numerics::vector::{Vec3, add, scale, sub};
+use numerics::vector::{Vec3, add, length, scale, sub};
 use serde::{Deserialize, Serialize};
 
 pub use refine::refined;
@@ -61,6 +61,12 @@ pub trait Flow: Sync {
     /// The way, in cells, from each point, a place in cells. Points of successive calls are near each other, which a
     /// reader may make use of.
     fn reader(&self) -> impl FnMut(Vec3) -> Vec3;
+
+    /// The way from the middle of each cell; cells of successive calls are near each other.
+    fn centre_reader(&self) -> impl FnMut(Cell) -> Vec3 {
+        let mut way = self.reader();
+        move |cell| way(cell.map(|x| x as f32 + 0.5))
+    }
 
     /// What is left of a way from a point, where a thin solid is in it: forwards in time, or backwards where `direction` is
     /// −1 instead of 1.
@@ -144,14 +150,18 @@ impl LevelSet {
         let far = far_from_surface(reach);
         let mut phi = std::mem::take(&mut self.phi);
         self.stencil.update([&mut phi], |runs, first, [phi]| {
-            let (mut way, mut sampler) = (flow.reader(), PhiSampler::new(before));
+            let (mut way, mut way_at, mut sampler) = (flow.reader(), flow.centre_reader(), PhiSampler::new(before));
             for run in runs {
                 for n in 0..run.len as usize {
                     let value = &mut phi[run.at as usize + n - first];
                     if value.abs() < far {
                         let [x, y, z] = run.cell;
-                        let at = [x + n as i32, y, z].map(|x| x as f32 + 0.5);
-                        let middle = sub(at, scale(way(at), 0.5));
+                        let cell = [x + n as i32, y, z];
+                        let (at, way_here) = (cell.map(|x| x as f32 + 0.5), way_at(cell));
+                        if value.abs() > far_from_surface(length(way_here)) {
+                            continue;
+                        }
+                        let middle = sub(at, scale(way_here, 0.5));
                         let back = scale(way(middle), -1.0);
                         let carried = sampler.at(add(at, back));
                         let is_reached = *value > 0.0 && carried <= 0.0;
@@ -298,7 +308,7 @@ fn at_surface(sampler: &mut PhiSampler<'_>, place: Vec3, normal: Vec3, heights: 
 
 /// |φ| from which on a cell cannot come next to the surface in a step. φ may fall short of the distance by a fifth.
 pub(crate) fn far_from_surface(reach: f32) -> f32 {
-    1.25 * reach + 2.5
+    1.25 * reach + 1.5
 }
 
 /// Where a point goes in a step: third order (Ralston 1962).

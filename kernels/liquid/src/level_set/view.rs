@@ -69,6 +69,9 @@ impl<'a> RowBlocks<'a> {
         for (axis, (at, stride)) in [(x, 1), (self.y, 4), (self.z, 16)].into_iter().enumerate() {
             let first = (self.view.low[axis].saturating_sub(at - 1)).clamp(0, 3) as usize;
             let last = (self.view.high[axis].saturating_sub(at)).clamp(0, 3) as usize;
+            if (first, last) == (0, 3) {
+                continue;
+            }
             for line in 0..16 {
                 // The other two axes count lines.
                 let start = match axis {

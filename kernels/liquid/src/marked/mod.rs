@@ -323,6 +323,12 @@ impl Flow for Scaled<'_> {
         move |point| scale(way(scale(point, 1.0 / size)), size)
     }
 
+    fn centre_reader(&self) -> impl FnMut(Cell) -> Vec3 {
+        let (mut way, mut way_at) = (self.reader(), self.flow.centre_reader());
+        let is_same = self.size == 1.0;
+        move |cell| if is_same { way_at(cell) } else { way(cell.map(|x| x as f32 + 0.5)) }
+    }
+
     fn held(&self, from: Vec3, way: Vec3, direction: f32) -> Option<Held> {
         let unit = 1.0 / self.size;
         let held = self.flow.held(scale(from, unit), scale(way, unit), direction)?;

@@ -1,5 +1,6 @@
 //! One multigrid V-cycle: an approximate solution of A·q = b, symmetric in b, in `f32`.
 
+use crate::rows::Finder;
 use crate::transfer::{Place, add_interpolated, restrict};
 
 use super::coarsen::coarsened;
@@ -108,10 +109,10 @@ impl Multigrid {
 /// What the weights of interpolation are multiplied by in each fine cell; 0 where it is not liquid. Solid cells are left
 /// out, so that walls do not pull the pressure down; air counts, with pressure 0.
 fn scales(fine: &Level, coarse: &Level) -> Vec<f32> {
-    let scale = |cell| {
+    let scale = |finder: &mut Finder<'_>, cell| {
         let (mut sum, mut reaches_liquid) = (0.0, false);
         Place::Centre.each_parent(cell, |parent, weight| {
-            let kind = coarse.rows().find(parent).map_or(CellKind::Air, |at| coarse.kinds[at]);
+            let kind = finder.find(parent).map_or(CellKind::Air, |at| coarse.kinds[at]);
             reaches_liquid |= kind == CellKind::Liquid;
             if kind != CellKind::Solid {
                 sum += weight;
@@ -120,5 +121,6 @@ fn scales(fine: &Level, coarse: &Level) -> Vec<f32> {
         if reaches_liquid { 1.0 / sum } else { 0.0 }
     };
     let liquid = fine.stencil.active();
-    fine.rows().resampled(liquid, &liquid.tabulate(scale), 0.0)
+    let [scales] = liquid.tabulate_with(|| Finder::new(coarse.rows()), |finder, cell, _| [scale(finder, cell)]);
+    fine.rows().resampled(liquid, &scales, 0.0)
 }

@@ -11,7 +11,10 @@ use crate::step::domain::{Domain, Obstacle};
 use crate::step::outflow::Outflow;
 use crate::step::sources::FlowAccount;
 use crate::step::{LiquidSettings, Moving, Surface, Surroundings, Wall};
-use crate::velocity::{ALL_FACES, FaceFields, FaceMask, MacVelocity, Sampler, Site, extrapolate, resampled};
+use crate::velocity::{ALL_FACES, FaceFields, FaceMask, MacVelocity, Sampler, Site, extrapolate_first, resampled};
+
+/// Layers past the liquid in which what is carried has values of its own: the faces of the next substep come from there.
+const OWN_LAYERS: u32 = 3;
 
 /// What gravity and pressure together added to the velocity in a substep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -163,7 +166,8 @@ impl Motion {
         std::array::from_fn(|axis| faces[axis].iter().zip(&gained[axis]).map(|(u, gain)| u + ratio * gain).collect())
     }
 
-    /// Fields that are known where the velocity is, continued to all of `rows`. `steepest`: see [`extrapolate`].
+    /// Fields that are known where the velocity is, continued to all of `rows`; beyond [`OWN_LAYERS`] all are as the first is.
+    /// `steepest`: see [`extrapolate_first`].
     pub(super) fn continued<const F: usize>(
         &self,
         fields: [&FaceFields<f32>; F],
@@ -177,7 +181,7 @@ impl Motion {
         let mut fields = fields.map(|faces| resampled(rows, self.rows(), faces));
         images.fill(&mut known);
         fields.iter_mut().for_each(|faces| images.fill_each(faces));
-        extrapolate(rows, &mut known, fields.each_mut(), steepest, u32::MAX);
+        extrapolate_first(rows, &mut known, fields.each_mut(), steepest, [OWN_LAYERS, u32::MAX]);
         fields.map(|mut faces| {
             images.fill_each(&mut faces);
             hold_walls(domain, rows, &mut faces);

@@ -2,7 +2,7 @@
 
 use numerics::vector::{Vec3, add, length, scale, sub};
 
-use crate::level_set::{Distance, Held, PhiChange, PhiView, held};
+use crate::level_set::{Distance, Held, PhiChange, PhiView, far_from_surface, held};
 use crate::rows::{Cell, Periods};
 use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
@@ -12,7 +12,7 @@ use crate::step::project::{Materials, Projection};
 use crate::step::sources::{LiquidSink, LiquidSource};
 use crate::step::turned;
 use crate::step::{LiquidReport, LiquidSettings, Splitting};
-use crate::velocity::{Advection, FaceFields, MacVelocity, Sampler};
+use crate::velocity::{Advection, Around, FaceFields, MacVelocity, Sampler};
 
 /// What is around a liquid.
 #[derive(Clone, Copy)]
@@ -84,6 +84,16 @@ impl<'a> Moving<'a> {
         move |point| scale(velocity.at(&mut sampler, periods.home_point(point)), step)
     }
 
+    /// The way, in cells, at the middle of a cell. Fast where successive cells are near each other.
+    pub(crate) fn centre_reader(&self) -> impl FnMut(Cell) -> Vec3 + use<'a> {
+        let Self { velocity, step, periods, .. } = *self;
+        let (mut around, mut way) = (Around::new(velocity.rows()), self.reader());
+        move |cell| match if periods.any() { None } else { around.places(cell) } {
+            Some(places) => scale(places.at_centre(velocity.faces()), step),
+            None => way(cell.map(|x| x as f32 + 0.5)),
+        }
+    }
+
     /// What is left of a way, in cells, from a place, where a thin solid is in it: forwards in time, or backwards where
     /// `direction` is −1 instead of 1.
     pub(crate) fn held(&self, from: Vec3, way: Vec3, direction: f32) -> Option<Held> {
@@ -111,11 +121,16 @@ const FARTHEST: f32 = 64.0;
 /// Cells that a solid moves in a substep, at most, for liquid to notice it on its way.
 const FASTEST: f32 = 2.5;
 
-/// Cells past the liquid, besides those that it moves, whose velocity is needed: a surface follows the flow in a band.
-const BAND: i32 = 5;
+/// Cells past the liquid whose velocity is needed where nothing moves farther than `reach` cells: a surface follows the flow
+/// as far as it may come.
+fn layers(reach: f32) -> i32 {
+    far_from_surface(reach).ceil() as i32 + 1
+}
 
 /// Cells past the liquid whose velocity a substep needs, at most.
-pub(super) const MOST_LAYERS: i32 = BAND + FARTHEST as i32;
+pub(super) fn most_layers() -> i32 {
+    layers(FARTHEST)
+}
 
 /// Moves on between two times since the start of the frame, s. Gravity and viscosity are read in the middle.
 pub(super) fn substep(
@@ -197,7 +212,7 @@ fn continued(
     [step, reach]: [f32; 2],
 ) -> (MacVelocity, Option<FaceFields<f32>>) {
     let steepest = STEEPEST / step;
-    let rows = motion.rows_past_liquid(domain, BAND + reach.ceil() as i32);
+    let rows = motion.rows_past_liquid(domain, layers(reach));
     let own = motion.velocity.faces();
     match &motion.gain {
         Some(gain) => {

@@ -6,11 +6,9 @@
 //! is carried, with a = g − ∇p of the substep before: with ∇p alone, hydrostatic pressure would act on the surface of the
 //! substep before, and waves grow.
 
-use numerics::vector::Vec3;
-
 use crate::rows::Periods;
 use crate::step::motion::{Gain, Motion};
-use crate::velocity::{FaceFields, Sampler, Site, extrapolate, resampled};
+use crate::velocity::{Around, FaceFields, extrapolate, resampled};
 
 /// Layers of faces past the liquid that differences at its faces reach.
 const REACHED: u32 = 2;
@@ -39,31 +37,22 @@ pub(super) fn carried(
     extrapolate(&rows, &mut known, [&mut velocity, &mut gained], steepest, REACHED);
     let weight = 0.5 * step * (seconds / gain.seconds) as f32;
     motion.rows().tabulate_with(
-        || Sampler::new(&rows),
-        |sampler, cell, at| {
-            let mut carried = [0.0; 3];
-            for axis in (0..3).filter(|axis| motion.known[at] >> axis & 1 == 1) {
-                let own = motion.velocity.faces()[axis][at];
-                let middle = Site::FACES[axis].of(cell);
-                let mut sum =
-                    along(sampler, &velocity[axis], axis, middle).clamp(-steepest, steepest) * gain.faces[axis][at];
-                for other in (0..3).filter(|other| *other != axis) {
-                    let Some(corners) = sampler.corners(Site::FACES[other], middle) else { continue };
-                    let slope = corners.slope(&velocity[other], axis);
-                    sum += slope.clamp(-steepest, steepest) * corners.value(&gained[other]);
+        || Around::new(&rows),
+        |around, cell, at| {
+            let known = motion.known[at];
+            let Some(places) = (if known == 0 { None } else { around.places(cell) }) else { return [0.0; 3] };
+            [0, 1, 2].map(|axis| {
+                if known >> axis & 1 == 0 {
+                    return 0.0;
                 }
-                carried[axis] = own + weight * sum;
-            }
-            carried
+                let slope = places.along(&velocity[axis], axis).clamp(-steepest, steepest);
+                let mut sum = slope * gain.faces[axis][at];
+                for other in [(axis + 1) % 3, (axis + 2) % 3] {
+                    let slope = places.slope(&velocity[other], other, axis).clamp(-steepest, steepest);
+                    sum += slope * places.mean(&gained[other], other, axis);
+                }
+                motion.velocity.faces()[axis][at] + weight * sum
+            })
         },
     )
-}
-
-/// The derivative of a field on faces along their own axis.
-fn along(sampler: &mut Sampler<'_>, field: &[f32], axis: usize, face: Vec3) -> f32 {
-    let (mut below, mut above) = (face, face);
-    below[axis] -= 0.5;
-    above[axis] += 0.5;
-    let site = Site::FACES[axis];
-    sampler.value(field, site, above) - sampler.value(field, site, below)
 }

@@ -3,7 +3,7 @@
 use numerics::vector::{Vec3, add, scale};
 
 use crate::rows::{CellRows, Periods};
-use crate::velocity::{Corners, FaceFields, FaceMask, MacVelocity, Sampler, Site, trilinear, within};
+use crate::velocity::{Around, Corners, FaceFields, FaceMask, MacVelocity, Sampler, Site, trilinear, within};
 
 /// Follows points through a velocity that does not change meanwhile, by Ralston's third-order method (1962).
 #[derive(Clone, Debug)]
@@ -31,7 +31,14 @@ impl<'a> Tracer<'a> {
     /// Where a point at `start` goes.
     #[inline(always)]
     pub fn trace(&mut self, start: Vec3) -> Vec3 {
-        let a = self.velocity.at(&mut self.sampler, start);
+        let velocity = self.velocity.at(&mut self.sampler, start);
+        self.trace_from(start, velocity)
+    }
+
+    /// The same, given the velocity at `start`.
+    #[inline(always)]
+    fn trace_from(&mut self, start: Vec3, velocity: Vec3) -> Vec3 {
+        let a = velocity;
         let b = self.moved(start, scale(a, 0.5));
         let b = self.velocity.at(&mut self.sampler, b);
         let c = self.moved(start, scale(b, 0.75));
@@ -116,8 +123,13 @@ impl Advection<'_> {
         let [x, y, z] = self.bounded(carried, rows, wanted);
         let first = [&x, &y, &z];
         let there = first.map(|field| field.iter().map(|[value, ..]| *value).collect::<Vec<_>>());
-        let start = || (self.tracer(self.step), Sampler::new(rows), Sampler::new(self.velocity.rows()));
-        rows.tabulate_with(start, |(tracer, new, old), cell, at| {
+        let old = self.velocity.rows();
+        let start = || (self.tracer(self.step), Sampler::new(rows), Sampler::new(old), Around::new(old));
+        rows.tabulate_with(start, |(tracer, new, old, around), cell, at| {
+            if wanted[at] == 0 {
+                return [0.0; 3];
+            }
+            let places = around.places(cell);
             let mut value = |axis: usize| {
                 if wanted[at] >> axis & 1 == 0 {
                     return 0.0;
@@ -125,10 +137,17 @@ impl Advection<'_> {
                 let site = Site::FACES[axis];
                 let [there_value, low, high] = first[axis][at];
                 let known = |corners: &Corners| corners.values(wanted).iter().all(|mask| mask >> axis & 1 == 1);
-                let back = new.corners(site, tracer.trace(site.of(cell))).filter(known);
-                let before = old.corners(site, site.of(cell));
-                let (Some(back), Some(before)) = (back, before) else { return there_value };
-                let error = before.value(&carried[axis]) - back.value(&there[axis]);
+                let to = match &places {
+                    Some(places) => tracer.trace_from(site.of(cell), places.at_face(self.velocity.faces(), axis)),
+                    None => tracer.trace(site.of(cell)),
+                };
+                let Some(back) = new.corners(site, to).filter(known) else { return there_value };
+                let before = match &places {
+                    Some(places) => Some(carried[axis][places.own()]),
+                    None => old.corners(site, site.of(cell)).map(|before| before.value(&carried[axis])),
+                };
+                let Some(before) = before else { return there_value };
+                let error = before - back.value(&there[axis]);
                 within(there_value + 0.5 * error, low, high)
             };
             [value(0), value(1), value(2)]
@@ -137,14 +156,22 @@ impl Advection<'_> {
 
     /// Of each wanted face the value where it came from, and the least and largest value around.
     fn bounded(&self, carried: &FaceFields<f32>, rows: &CellRows, wanted: &[FaceMask]) -> [Vec<Bounded>; 3] {
-        let start = || (self.tracer(-self.step), Sampler::new(self.velocity.rows()));
-        rows.tabulate_with(start, |(tracer, sampler), cell, at| {
+        let old = self.velocity.rows();
+        let start = || (self.tracer(-self.step), Sampler::new(old), Around::new(old));
+        rows.tabulate_with(start, |(tracer, sampler, around), cell, at| {
+            if wanted[at] == 0 {
+                return [[0.0; 3]; 3];
+            }
+            let places = around.places(cell);
             let mut value = |axis: usize| {
                 if wanted[at] >> axis & 1 == 0 {
                     return [0.0; 3];
                 }
                 let site = Site::FACES[axis];
-                let from = tracer.trace(site.of(cell));
+                let from = match &places {
+                    Some(places) => tracer.trace_from(site.of(cell), places.at_face(self.velocity.faces(), axis)),
+                    None => tracer.trace(site.of(cell)),
+                };
                 let Some(corners) = sampler.corners(site, from) else {
                     return [sampler.value(&carried[axis], site, from); 3];
                 };

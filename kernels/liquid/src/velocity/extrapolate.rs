@@ -4,15 +4,13 @@
 //! known face behind it, on the same line, continues linearly; only where no neighbour has one do they say what they are
 //! themselves. Linear fields, rigid rotation among them, are continued exactly.
 
+use std::mem::replace;
 use std::ops::Range;
 
 use numerics::parallel;
 
 use crate::rows::{CellRows, RowSpan};
 use crate::velocity::{ALL_FACES, FaceFields, FaceMask};
-
-/// A row that is not stored.
-const NONE: u32 = u32::MAX;
 
 /// Values that one thread goes through.
 const CHUNK: usize = 8192;
@@ -24,8 +22,11 @@ struct Line {
     len: u32,
     /// Whether the cells before the first and after the last are stored.
     joined: [bool; 2],
-    /// Where the first value of the rows at y − 2, y − 1, y + 1, y + 2 and z − 2, z − 1, z + 1, z + 2 is.
+    /// Where the first value of the rows at y − 2, y − 1, y + 1, y + 2 and z − 2, z − 1, z + 1, z + 2 is; of rows that are not
+    /// stored, a place past all cells, where nothing is known.
     beside: [u32; 8],
+    /// From there to the value beside the next cell: 1, or 0 where the row is not stored.
+    step: [u32; 8],
 }
 
 const BESIDE: [[i32; 2]; 8] = [[-2, 0], [-1, 0], [1, 0], [2, 0], [0, -2], [0, -1], [0, 1], [0, 2]];
@@ -33,17 +34,108 @@ const BESIDE: [[i32; 2]; 8] = [[-2, 0], [-1, 0], [1, 0], [2, 0], [0, -2], [0, -1
 /// Pairs of a neighbour and the one behind it, as numbers of [`BESIDE`].
 const PAIRS: [[usize; 2]; 4] = [[1, 0], [2, 3], [5, 4], [6, 7]];
 
+impl Line {
+    /// Where the rows next to it that are stored have its cells.
+    fn rows_beside(&self) -> impl Iterator<Item = Range<usize>> {
+        let rows = PAIRS.into_iter().map(|[near, _]| near).filter(|near| self.step[*near] == 1);
+        rows.map(|near| self.beside[near] as usize..(self.beside[near] + self.len) as usize)
+    }
+
+    /// Each neighbour of a cell and the one behind it.
+    #[inline(always)]
+    fn pairs(&self, n: u32, nowhere: usize) -> [[usize; 2]; 6] {
+        // Cells of a line that follow each other are stored next to each other; beyond its ends one more is known of.
+        let (at, below) = (self.at + n, n + u32::from(self.joined[0]));
+        let above = self.len - 1 - n + u32::from(self.joined[1]);
+        let down = |by: u32| if by <= below { (at - by) as usize } else { nowhere };
+        let up = |by: u32| if by <= above { (at + by) as usize } else { nowhere };
+        let pair = |rows: [usize; 2]| rows.map(|row| (self.beside[row] + n * self.step[row]) as usize);
+        let [a, b, c, d] = PAIRS;
+        [[down(1), down(2)], [up(1), up(2)], pair(a), pair(b), pair(c), pair(d)]
+    }
+}
+
+/// The values of a cell's three faces, and a spare one.
+type Lanes = [f32; 4];
+
+/// All bits of the lanes of a mask of faces.
+const BITS: [[u32; 4]; 8] = {
+    let (mut all, mut mask) = ([[0; 4]; 8], 0);
+    while mask < 8 {
+        let mut axis = 0;
+        while axis < 3 {
+            all[mask][axis] = if mask >> axis & 1 == 1 { u32::MAX } else { 0 };
+            axis += 1;
+        }
+        mask += 1;
+    }
+    all
+};
+
+/// Adds the lanes of a mask of faces.
+#[inline(always)]
+fn add_lanes(sums: &mut Lanes, values: Lanes, faces: FaceMask) {
+    let bits = &BITS[usize::from(faces & ALL_FACES)];
+    for lane in 0..4 {
+        sums[lane] += f32::from_bits(values[lane].to_bits() & bits[lane]);
+    }
+}
+
 /// What a cell gained in a layer.
 struct Gain<const F: usize> {
     at: u32,
     faces: FaceMask,
-    values: [[f32; 3]; F],
+    values: [Lanes; F],
 }
 
 /// What the cells of neighbouring lines gained in a layer, and which of the lines did.
 struct Gains<const F: usize> {
     cells: Vec<Gain<F>>,
     lines: Vec<u32>,
+}
+
+/// Part of the fields, which one thread changes.
+struct Part<'a, const F: usize> {
+    /// Where its first cell is.
+    first: usize,
+    known: &'a mut [FaceMask],
+    values: &'a mut [[Lanes; F]],
+    fields: [[&'a mut [f32]; 3]; F],
+}
+
+impl<'a, const F: usize> Part<'a, F> {
+    /// The cells before place `end`; the rest stays.
+    fn split_off(&mut self, end: usize) -> Self {
+        let len = end - self.first;
+        let first = replace(&mut self.first, end);
+        let known = self.known.split_off_mut(..len).unwrap_or_default();
+        let values = self.values.split_off_mut(..len).unwrap_or_default();
+        let part = |field: &mut &'a mut [f32]| field.split_off_mut(..len).unwrap_or_default();
+        let fields = self.fields.each_mut().map(|faces| faces.each_mut().map(part));
+        Self { first, known, values, fields }
+    }
+
+    /// Puts the values of each cell together.
+    fn pack(&mut self) {
+        for (n, values) in self.values.iter_mut().enumerate() {
+            for (lanes, faces) in values.iter_mut().zip(&self.fields) {
+                *lanes = [faces[0][n], faces[1][n], faces[2][n], 0.0];
+            }
+        }
+    }
+
+    fn apply(&mut self, gains: &[Gain<F>]) {
+        for gain in gains {
+            let n = gain.at as usize - self.first;
+            self.known[n] |= gain.faces;
+            for (field, values) in gain.values.iter().enumerate() {
+                for axis in (0..3).filter(|axis| gain.faces >> axis & 1 == 1) {
+                    self.values[n][field][axis] = values[axis];
+                    self.fields[field][axis][n] = values[axis];
+                }
+            }
+        }
+    }
 }
 
 /// The lines beside which, or in which, faces became known in the last layer: others gain nothing in the next.
@@ -71,8 +163,8 @@ impl Front {
             if line.joined[1] {
                 self.is_near[number + 1] = true;
             }
-            for row in PAIRS.map(|[near, _]| line.beside[near]).into_iter().filter(|row| *row != NONE) {
-                let [first, last] = [row, row + line.len - 1].map(|at| self.line_of[at as usize] as usize);
+            for row in line.rows_beside() {
+                let [first, last] = [row.start, row.end - 1].map(|at| self.line_of[at] as usize);
                 self.is_near[first..=last].fill(true);
             }
         }
@@ -88,43 +180,65 @@ impl Front {
 pub fn extrapolate<const F: usize>(
     rows: &CellRows,
     known: &mut [FaceMask],
-    mut fields: [&mut FaceFields<f32>; F],
+    fields: [&mut FaceFields<f32>; F],
     steepest: f32,
     layers: u32,
 ) {
+    extrapolate_first(rows, known, fields, steepest, [layers; 2]);
+}
+
+/// The same with each field continued by `own` layers; then up to `layers` the first alone, and the others are as it is.
+///
+/// # Panics
+/// Where a field does not have one value a cell.
+pub fn extrapolate_first<const F: usize>(
+    rows: &CellRows,
+    known: &mut [FaceMask],
+    mut fields: [&mut FaceFields<f32>; F],
+    steepest: f32,
+    [own, layers]: [u32; 2],
+) {
     let fits = |faces: &&mut FaceFields<f32>| faces.iter().all(|field| field.len() == rows.len());
     assert!(known.len() == rows.len() && fields.iter().all(fits), "one value a cell");
-    let lines = lines(rows);
+    let (lines, nowhere) = (lines(rows), rows.len());
     let chunks = chunks(&lines);
     let mut front = Front::new(&lines);
-    for _ in 0..layers {
+    // One more place than cells, where nothing is known.
+    let mut packed = vec![[[0.0; 4]; F]; nowhere + 1];
+    let mut masks = [&*known, &[0]].concat();
+    let mut update = |masks: &mut [FaceMask], packed: &mut [[Lanes; F]], change: &Change<'_, F>| {
+        let fields = fields.each_mut().map(|faces| faces.each_mut().map(|field| &mut field[..]));
+        let mut rest = Part { first: 0, known: masks, values: packed, fields };
+        let end = |chunk: &Range<usize>| lines.get(chunk.end).map_or(nowhere, |next| next.at as usize);
+        parallel::for_each(chunks.iter().map(|chunk| rest.split_off(end(chunk))), change);
+    };
+    update(&mut masks, &mut packed, &|_, mut part| part.pack());
+    for layer in 0..layers {
+        let continued = if layer < own { F } else { 1 };
         let gains: Vec<Gains<F>> = {
-            let layer = Layer { lines: &lines, known, fields: fields.each_ref().map(|faces| &**faces), steepest };
+            let layer = Layer { lines: &lines, known: &masks, values: &packed, steepest, continued };
             parallel::map(&chunks, |_, chunk| layer.gains(chunk, &front.is_near))
         };
         if gains.iter().all(|gains| gains.lines.is_empty()) {
-            return;
+            break;
         }
-        for gain in gains.iter().flat_map(|gains| &gains.cells) {
-            let at = gain.at as usize;
-            known[at] |= gain.faces;
-            for (faces, values) in fields.iter_mut().zip(gain.values) {
-                for axis in 0..3 {
-                    if gain.faces >> axis & 1 == 1 {
-                        faces[axis][at] = values[axis];
-                    }
-                }
-            }
-        }
+        update(&mut masks, &mut packed, &|n, mut part| part.apply(&gains[n].cells));
         front.advance(&lines, gains.iter().flat_map(|gains| &gains.lines));
     }
+    known.copy_from_slice(&masks[..nowhere]);
 }
+
+/// What to do with each part, given its number.
+type Change<'a, const F: usize> = dyn Fn(usize, Part<'_, F>) + Sync + 'a;
 
 struct Layer<'a, const F: usize> {
     lines: &'a [Line],
+    /// Of each cell, and of one more.
     known: &'a [FaceMask],
-    fields: [&'a FaceFields<f32>; F],
+    values: &'a [[Lanes; F]],
     steepest: f32,
+    /// Fields that are continued; the others are as the first.
+    continued: usize,
 }
 
 impl<const F: usize> Layer<'_, F> {
@@ -139,7 +253,7 @@ impl<const F: usize> Layer<'_, F> {
             }
             self.reach(line, own, &mut reached);
             let before = gains.cells.len();
-            for (n, faces) in reached.iter().enumerate().filter(|(_, faces)| **faces != 0) {
+            for (n, faces) in (0..).zip(&reached).filter(|(_, faces)| **faces != 0) {
                 gains.cells.push(self.gain(line, n, *faces));
             }
             if gains.cells.len() > before {
@@ -153,9 +267,8 @@ impl<const F: usize> Layer<'_, F> {
     fn reach(&self, line: &Line, own: &[FaceMask], reached: &mut Vec<FaceMask>) {
         reached.clear();
         reached.resize(own.len(), 0);
-        for row in PAIRS.map(|[near, _]| line.beside[near]).into_iter().filter(|row| *row != NONE) {
-            let near = &self.known[row as usize..][..own.len()];
-            reached.iter_mut().zip(near).for_each(|(reached, mask)| *reached |= mask);
+        for row in line.rows_beside() {
+            reached.iter_mut().zip(&self.known[row]).for_each(|(reached, mask)| *reached |= mask);
         }
         let last = own.len() - 1;
         reached[1..].iter_mut().zip(own).for_each(|(reached, mask)| *reached |= mask);
@@ -169,58 +282,53 @@ impl<const F: usize> Layer<'_, F> {
         reached.iter_mut().zip(own).for_each(|(reached, mask)| *reached &= !mask);
     }
 
-    fn gain(&self, line: &Line, n: usize, faces: FaceMask) -> Gain<F> {
-        let pairs = pairs(line, n as u32);
-        let mut gain = Gain { at: line.at + n as u32, faces, values: [[0.0; 3]; F] };
-        for axis in (0..3).filter(|axis| faces >> axis & 1 == 1) {
-            let is_known = |at: u32| at != NONE && self.known[at as usize] >> axis & 1 == 1;
-            let mut count = [0.0_f32; 2];
-            // Of neighbours with a known face behind them, and of the others.
-            let mut sums = [[0.0; 2]; F];
-            for [near, behind] in pairs {
-                if !is_known(near) {
-                    continue;
-                }
-                let linear = is_known(behind);
-                count[usize::from(!linear)] += 1.0;
-                for (faces, sums) in self.fields.iter().zip(&mut sums) {
-                    let value = faces[axis][near as usize];
-                    let slope = if linear { self.limited(value - faces[axis][behind as usize]) } else { 0.0 };
-                    sums[usize::from(!linear)] += value + slope;
+    #[inline(always)]
+    fn gain(&self, line: &Line, n: u32, faces: FaceMask) -> Gain<F> {
+        // Of neighbours with a known face behind them, and of the others.
+        let (mut sums, mut counts) = ([[[0.0; 4]; F]; 2], [[0.0; 4]; 2]);
+        for [near, behind] in line.pairs(n, self.known.len() - 1) {
+            let known = faces & self.known[near];
+            if known == 0 {
+                continue;
+            }
+            let linear = known & self.known[behind];
+            let (near, behind) = (&self.values[near], &self.values[behind]);
+            if linear != 0 {
+                add_lanes(&mut counts[0], [1.0; 4], linear);
+                for field in 0..self.continued {
+                    let slope = |lane: usize| self.limited(near[field][lane] - behind[field][lane]);
+                    let values = std::array::from_fn(|lane| near[field][lane] + slope(lane));
+                    add_lanes(&mut sums[0][field], values, linear);
                 }
             }
-            let kind = usize::from(count[0] == 0.0);
-            for (values, sums) in gain.values.iter_mut().zip(sums) {
-                values[axis] = sums[kind] / count[kind];
+            if linear != known {
+                add_lanes(&mut counts[1], [1.0; 4], known & !linear);
+                for field in 0..self.continued {
+                    add_lanes(&mut sums[1][field], near[field], known & !linear);
+                }
             }
         }
-        gain
+        let mean = |field: usize, lane: usize| {
+            let kind = usize::from(counts[0][lane] == 0.0);
+            sums[kind][field][lane] / counts[kind][lane]
+        };
+        let values = std::array::from_fn(|field| {
+            let field = if field < self.continued { field } else { 0 };
+            std::array::from_fn(|lane| mean(field, lane))
+        });
+        Gain { at: line.at + n, faces, values }
     }
 
+    #[inline(always)]
     fn limited(&self, slope: f32) -> f32 {
         let slope = if slope > self.steepest { self.steepest } else { slope };
         if slope < -self.steepest { -self.steepest } else { slope }
     }
 }
 
-/// Each neighbour of a cell of a line, and the cell behind it.
-#[inline(always)]
-fn pairs(line: &Line, n: u32) -> [[u32; 2]; 6] {
-    let at = line.at + n;
-    // Cells of a line that follow each other are stored next to each other; beyond its ends one more is known of.
-    let below = n + u32::from(line.joined[0]);
-    let above = line.len - 1 - n + u32::from(line.joined[1]);
-    let down = |by: u32| if by <= below { at - by } else { NONE };
-    let up = |by: u32| if by <= above { at + by } else { NONE };
-    let row = |row: usize| if line.beside[row] == NONE { NONE } else { line.beside[row] + n };
-    let pair = |[near, behind]: [usize; 2]| [row(near), row(behind)];
-    let [a, b, c, d] = PAIRS;
-    [[down(1), down(2)], [up(1), up(2)], pair(a), pair(b), pair(c), pair(d)]
-}
-
 /// Cuts spans wherever a row beside them begins or ends.
 fn lines(rows: &CellRows) -> Vec<Line> {
-    let mut lines = Vec::new();
+    let (mut lines, nowhere) = (Vec::new(), rows.len() as u32);
     for ([y, z], spans) in rows.rows() {
         let mut beside = BESIDE.map(|[j, k]| rows.row(y + j, z + k));
         for span in spans {
@@ -233,7 +341,8 @@ fn lines(rows: &CellRows) -> Vec<Line> {
                     base
                 });
                 let joined = [x > span.start, end < span.end];
-                lines.push(Line { at: span.at(x) as u32, len: (end - x) as u32, joined, beside: found });
+                let (beside, step) = (found.map(|at| at.unwrap_or(nowhere)), found.map(|at| u32::from(at.is_some())));
+                lines.push(Line { at: span.at(x) as u32, len: (end - x) as u32, joined, beside, step });
                 x = end;
             }
         }
@@ -242,16 +351,16 @@ fn lines(rows: &CellRows) -> Vec<Line> {
 }
 
 /// Where a row stores `x`, and until which cell that holds. Drops the spans before it.
-fn base_at(row: &mut &[RowSpan], x: i32) -> (u32, i32) {
+fn base_at(row: &mut &[RowSpan], x: i32) -> (Option<u32>, i32) {
     while let Some((first, rest)) = row.split_first()
         && first.end <= x
     {
         *row = rest;
     }
     match row.first() {
-        Some(span) if span.start <= x => (span.at(x) as u32, span.end),
-        Some(span) => (NONE, span.start),
-        None => (NONE, i32::MAX),
+        Some(span) if span.start <= x => (Some(span.at(x) as u32), span.end),
+        Some(span) => (None, span.start),
+        None => (None, i32::MAX),
     }
 }
 

@@ -5,13 +5,15 @@
 //! speed; functions that move something get the number of cells that it moves at speed 1.
 
 mod advect;
+mod around;
 mod extrapolate;
 mod sampler;
 #[cfg(test)]
 mod tests;
 
 pub use advect::{Advection, Scheme, Tracer};
-pub use extrapolate::extrapolate;
+pub(crate) use around::Around;
+pub use extrapolate::{extrapolate, extrapolate_first};
 pub use sampler::{Corners, Sampler, Site, trilinear};
 
 use numerics::vector::Vec3;
@@ -63,11 +65,7 @@ impl MacVelocity {
     /// The velocity at `point`, by a sampler of these rows.
     #[inline(always)]
     pub fn at(&self, sampler: &mut Sampler<'_>, point: Vec3) -> Vec3 {
-        [
-            sampler.value(&self.faces[0], Site::FaceX, point),
-            sampler.value(&self.faces[1], Site::FaceY, point),
-            sampler.value(&self.faces[2], Site::FaceZ, point),
-        ]
+        sampler.velocity(&self.faces, point)
     }
 }
 

@@ -3,7 +3,7 @@
 use numerics::vector::Vec3;
 
 use crate::rows::{Cell, CellRows, RowSpan};
-use crate::velocity::within;
+use crate::velocity::{FaceFields, within};
 
 /// Where in its cell the value of a field lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,8 +54,12 @@ impl Corners {
     /// The eight values, x fastest.
     #[inline(always)]
     pub fn values<T: Copy>(&self, field: &[T]) -> [T; 8] {
-        let [a, b, c, d] = self.at.map(|at| at as usize);
-        [field[a], field[a + 1], field[b], field[b + 1], field[c], field[c + 1], field[d], field[d + 1]]
+        let pair = |at: u32| {
+            let pair = &field[at as usize..at as usize + 2];
+            [pair[0], pair[1]]
+        };
+        let [[a, b], [c, d], [e, f], [g, h]] = self.at.map(pair);
+        [a, b, c, d, e, f, g, h]
     }
 
     /// The value at the point.
@@ -101,8 +105,8 @@ const NO_WINDOW: Window = Window { row: [0; 2], start: 0, end: 0, base: [0; 4] }
 #[derive(Clone, Debug)]
 pub struct Sampler<'a> {
     rows: &'a CellRows,
-    /// For each site, one window for rows even and odd along y and z.
-    windows: [[Window; 4]; 4],
+    /// One window for each row modulo 4 along y and z: those around a point, for all sites, have different ones.
+    windows: [Window; 16],
     /// Those of `rows`, once a point far from all cells has asked for them.
     bounds: Option<(Cell, Cell)>,
 }
@@ -110,18 +114,22 @@ pub struct Sampler<'a> {
 impl<'a> Sampler<'a> {
     /// For fields on `rows`.
     pub fn new(rows: &'a CellRows) -> Self {
-        Self { rows, windows: [[NO_WINDOW; 4]; 4], bounds: None }
+        Self { rows, windows: [NO_WINDOW; 16], bounds: None }
     }
 
     /// The values around `point`, in cells; `None` where one is not stored.
     #[inline(always)]
     pub fn corners(&mut self, site: Site, point: Vec3) -> Option<Corners> {
-        let ([x, y, z], t) = split(site, point);
-        let slot = (y & 1 | (z & 1) << 1) as usize;
-        let mut window = &self.windows[site as usize][slot];
+        self.corners_of(split(site, point))
+    }
+
+    #[inline(always)]
+    fn corners_of(&mut self, ([x, y, z], t): (Cell, Vec3)) -> Option<Corners> {
+        let slot = (y & 3 | (z & 3) << 2) as usize;
+        let mut window = &self.windows[slot];
         if window.row != [y, z] || x < window.start || x >= window.end {
-            self.windows[site as usize][slot] = self.window([x, y, z])?;
-            window = &self.windows[site as usize][slot];
+            self.windows[slot] = self.window([x, y, z])?;
+            window = &self.windows[slot];
         }
         Some(Corners { at: window.base.map(|base| base.wrapping_add(x as u32)), t })
     }
@@ -131,6 +139,27 @@ impl<'a> Sampler<'a> {
     #[inline(always)]
     pub fn value(&mut self, field: &[f32], site: Site, point: Vec3) -> f32 {
         match self.corners(site, point) {
+            Some(corners) => corners.value(field),
+            None => self.value_beside(field, site, point),
+        }
+    }
+
+    /// A velocity on faces at `point`, as [`Self::value`] finds each component.
+    #[inline(always)]
+    pub fn velocity(&mut self, faces: &FaceFields<f32>, point: Vec3) -> Vec3 {
+        // Between faces and between centres, along each axis.
+        let [x, y, z] = [0, 1, 2].map(|axis| split_along(point[axis], 0.0));
+        let [a, b, c] = [0, 1, 2].map(|axis| split_along(point[axis], 0.5));
+        [
+            self.component(&faces[0], Site::FaceX, [x, b, c], point),
+            self.component(&faces[1], Site::FaceY, [a, y, c], point),
+            self.component(&faces[2], Site::FaceZ, [a, b, z], point),
+        ]
+    }
+
+    #[inline(always)]
+    fn component(&mut self, field: &[f32], site: Site, [x, y, z]: [(i32, f32); 3], point: Vec3) -> f32 {
+        match self.corners_of(([x.0, y.0, z.0], [x.1, y.1, z.1])) {
             Some(corners) => corners.value(field),
             None => self.value_beside(field, site, point),
         }
@@ -232,15 +261,17 @@ const WHOLE: f32 = 12_582_912.0;
 #[inline(always)]
 fn split(site: Site, point: Vec3) -> (Cell, Vec3) {
     let offset = site.offset();
-    let (mut cell, mut t) = ([0; 3], [0.0; 3]);
-    for axis in 0..3 {
-        let p = within(point[axis], -FARTHEST, FARTHEST) - offset[axis];
-        // A whole p may take the cell below, with t = 1.
-        let sum = (p - 0.5) + WHOLE;
-        cell[axis] = sum.to_bits() as i32 - WHOLE.to_bits() as i32;
-        t[axis] = p - (sum - WHOLE);
-    }
-    (cell, t)
+    let at = [0, 1, 2].map(|axis| split_along(point[axis], offset[axis]));
+    (at.map(|(cell, _)| cell), at.map(|(_, t)| t))
+}
+
+/// The same along one axis.
+#[inline(always)]
+fn split_along(x: f32, offset: f32) -> (i32, f32) {
+    let p = within(x, -FARTHEST, FARTHEST) - offset;
+    // A whole p may take the cell below, with t = 1.
+    let sum = (p - 0.5) + WHOLE;
+    (sum.to_bits() as i32 - WHOLE.to_bits() as i32, p - (sum - WHOLE))
 }
 
 #[cfg(test)]
