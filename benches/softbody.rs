@@ -7,6 +7,9 @@
 //! the cost of the start; no cache, no files, no self-collision. Errors are relative to sixteen accurate steps a
 //! frame, over few frames only: soft dough hanging by one end folds, and after a dozen frames thirty-two steps no
 //! longer agree with sixteen. Memory is that of a separate process.
+//!
+//! Dough that rests without volume preservation buckles by its sixth frame: springs alone do not carry it, also with 2,
+//! 4 or 8 steps a frame. Most Newton iterations of that case follow the collapse.
 
 use std::collections::BTreeSet;
 use std::convert::Infallible;

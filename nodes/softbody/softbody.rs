@@ -130,7 +130,8 @@ params! { PARAMS:
     BOUNCE: Param<f32> = Param::float("bounce", -1.0,
         "The largest speed at which a body leaves what it hits, relative to the speed at which it approached: at 0 it does \
          not bounce, at 0.5 it comes back to a quarter of the height at most. Below 0 it bounces as its stiffness and \
-         damping let it. Except at 0, impacts take more time steps.")
+         damping let it. Except at 0, impacts take more time steps; slower ones than three frames of gravity (1.2 m/s) do \
+         not, so they lose more speed.")
         .within(-1.0, 1.0);
     SELF_COLLISION: Param<bool> = Param::bool("self_collision", true, "Whether bodies collide with themselves.");
     BODY_COLLISION: Param<bool> = Param::bool("body_collision", true, "Whether bodies collide with each other.");
