@@ -35,8 +35,11 @@ fn column(rows: usize) -> impl Strategy<Value = Column> {
 
 /// Names with a meaning in a format, names that need escapes, and plain ones.
 fn name() -> impl Strategy<Value = String> {
-    const KNOWN: [&str; 17] = [
+    const KNOWN: [&str; 20] = [
         "mask",
+        "st",
+        "displayColor",
+        "normals",
         "Cd",
         "N",
         "uvw",

@@ -33,6 +33,11 @@ const CD: &str = "Cd";
 /// The primvar in which renderers look for texture coordinates.
 const TEX_COORDS: &str = "st";
 
+/// Whether a primvar of this name is read as an attribute of another: as `uvw`, `Cd` or `N`.
+pub(super) fn means_another(primvar: &str) -> bool {
+    [TEX_COORDS, "displayColor", "normals"].contains(&primvar)
+}
+
 /// The source of an attribute's values. The order of the variants is that in files.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Source {

@@ -317,11 +317,13 @@ fn attribute_names(kind: Kind, tracks: &[(Source, Track)]) -> Vec<(String, Optio
         .collect();
     let mut identifiers = names::distinct(&primvars).into_iter();
     targets()
-        .map(|target| match target {
+        .zip(tracks)
+        .map(|(target, (source, _))| match target {
             TargetName::Schema(name) => (name.to_owned(), None),
             TargetName::Primvar { name, own } => {
                 let name = identifiers.next().unwrap_or_else(|| names::identifier(name));
-                (format!("primvars:{name}"), (name != own).then(|| own.to_owned()))
+                let ambiguous = matches!(source, Source::Attribute(..)) && layout::means_another(own);
+                (format!("primvars:{name}"), (name != own || ambiguous).then(|| own.to_owned()))
             }
         })
         .collect()

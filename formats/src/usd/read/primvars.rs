@@ -2,6 +2,7 @@
 
 use engine::geometry::{Column, Kind, Owner};
 
+use super::super::layout::means_another;
 use super::layer::{Array, Value};
 use super::sample::Sampled;
 use super::stage::{Prim, UsdStage};
@@ -238,13 +239,21 @@ impl UsdStage {
         names.sort_unstable();
         names.dedup();
         let has = |name: &str| names.binary_search(&name).is_ok();
+        let is_literal =
+            |name: &str| -> Result<bool> { Ok(self.own_name(prim, name)?.as_deref().is_some_and(means_another)) };
         let mut found = Vec::new();
         for attribute in &names {
             let own = self.own_name(prim, attribute)?;
             let is_ours = own.is_some();
             let (name, role) = match *attribute {
+                // An attribute of that very name, not what others mean by it.
+                other if is_literal(other)? => {
+                    let name = own.unwrap_or_default();
+                    let role = self.role(prim, other, &name)?;
+                    (name, role)
+                }
                 "velocities" => ("v".to_owned(), Role::Vector),
-                "normals" if has("primvars:normals") => continue,
+                "normals" if has("primvars:normals") && !is_literal("primvars:normals")? => continue,
                 "normals" | "primvars:normals" => ("N".to_owned(), Role::Normal),
                 "widths" if kind == Kind::Curves || kind == Kind::Points => ("width".to_owned(), Role::Length),
                 "ids" if kind == Kind::Points => ("id".to_owned(), Role::None),
