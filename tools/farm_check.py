@@ -330,10 +330,10 @@ def main():
     dough = GRAPHS / "dough_rolling" / "dough_rolling.json"
     jobs = [
         Job("bear_storm", GRAPHS / "bear_storm" / "bear_storm.json", ["bear"], (1, 24)),
-        Job("dough_rolling", dough, ["dough", "pin"], (1, 44), settings=["lump.divisions=4"]),
+        Job("dough_rolling", dough, ["dough", "pin"], (1, 44), settings=["block.divisions=4", "fine_block.divisions=8"]),
         Job("both", folder / "both.json", ["hair", "dough", "grass", "still"], (1, 24), chunk=8),
     ]
-    solver = Job("killed", dough, ["dough", "pin"], (1, 40), settings=["lump.divisions=14"])
+    solver = Job("killed", dough, ["dough", "pin"], (1, 40), settings=["block.divisions=14"])
     slurm = all(shutil.which(name) or Path(f"/usr/sbin/{name}").exists() for name in ("munged", "slurmctld", "slurmd", "sbatch"))
     openjd = shutil.which(args.openjd)
     try:

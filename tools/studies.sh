@@ -43,9 +43,9 @@ study fig1 --output c --knob lee_collided.rotation_steps=2,4,8,16,32,64 --frames
 study fig2 --knob collided.rotation_steps=2,4,8,16,32,64 --frames 1-24x8
 
 # Soft bodies: substeps, and how finely bodies are cut. Coarser bodies than the scenes' own.
-study dough_pound --output inside --set body.spacing=0.02 --knob inside.substeps=1,2,4,8 --frames 8-24x8
-study dough_rolling --output dough --set body.spacing=0.02 --knob dough.substeps=1,2,4,8 --frames 8-24x8
-study egg_crack --output egg --set white.spacing=0.01 --set yolk.spacing=0.01 --knob egg.substeps=1,2,4,8 --frames 8-16x8
+study dough_pound --output inside --set block.divisions=8 --knob inside.substeps=1,2,4,8 --frames 8-24x8
+study dough_rolling --output dough --set block.divisions=8 --set fine_block.divisions=16 --knob dough.substeps=1,2,4,8 --frames 8-24x8
+study egg_crack --output egg --set outside.divisions=8 --set cavity.divisions=5 --set ball.divisions=5 --knob egg.substeps=1,2,4,8 --frames 8-16x8
 study softbody_cage --output fall --set figure.spacing=0.08 --set open.spacing=0.08 --knob fall.substeps=1,2,4,8 --frames 4-16x4
 study softbody_goal --output bun --knob body.spacing=0.04,0.03,0.02,0.015 --norm surface --frames 1-48x12
 study tetrahedralize --output dough --knob dough.spacing=0.03,0.021,0.015,0.0105,0.0075 --norm volume
