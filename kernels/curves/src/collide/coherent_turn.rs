@@ -6,8 +6,8 @@
 //! its direction at rest. Only where there is none does it turn from rest until it meets something. It may so come to the
 //! other side of a fold of the skin, but of no other obstacle: against those it turns from rest first.
 
+use super::ContactMethod;
 use super::segment_turn::{Nearby, Segment, Turned, first_gap, gather};
-use super::{Collide, ContactMethod};
 use numerics::tree::TriangleTree;
 use numerics::vector::DVec3;
 
@@ -22,21 +22,6 @@ pub(super) struct WayOut<'a> {
 }
 
 impl Segment {
-    /// Turns, with coherence where there is a way out of the skin. Not a closure of its caller, which would not always be
-    /// inlined, and then be compiled without the path's instructions.
-    #[inline(always)]
-    pub(super) fn turn_by<'t>(
-        &self,
-        how: &Collide<'t>,
-        way_out: Option<&WayOut<'t>>,
-        nearby: &mut Nearby<'t>,
-    ) -> Turned {
-        match way_out {
-            None => self.turn(how.method, how.obstacles, nearby),
-            Some(way_out) => self.turn_coherently(how.method, way_out, how.obstacles, nearby),
-        }
-    }
-
     /// Turns with coherence. Afterwards `nearby` holds everything that the segment may cross in its new direction.
     #[inline(always)]
     pub(super) fn turn_coherently<'t>(

@@ -157,18 +157,22 @@ impl Hair<'_> {
         nearby: &mut Nearby<'t>,
         reached: &mut Reached,
     ) -> DVec3 {
+        let turn = |segment: &Segment, nearby: &mut Nearby<'t>| match way_out {
+            None => segment.turn(how.method, how.obstacles, nearby),
+            Some(way_out) => segment.turn_coherently(how.method, way_out, how.obstacles, nearby),
+        };
         let mut turned = match self.half_space {
             Some(half_space) if half_space.frees(&(to_f64(self.rest[0]) + self.shift), segment) => {
                 Turned { direction: segment.to, met: false, clear: true }
             }
-            _ => segment.turn_by(how, way_out, nearby),
+            _ => turn(segment, nearby),
         };
         let mut end = segment.end(&turned.direction);
         if !turned.met && may_keep_goal && self.out[k] == self.goal[k] {
             end = self.goal[k + 1];
         }
         if !turned.clear && first_crossing(nearby, segment.start(&turned.direction), end).is_some() {
-            turned = segment.wary().turn_by(how, way_out, nearby);
+            turned = turn(&segment.wary(), nearby);
             end = segment.end(&turned.direction);
             if let Some(crossing) = first_crossing(nearby, segment.start(&turned.direction), end) {
                 reached.unfreed_segments += 1;

@@ -51,9 +51,9 @@ impl HalfSpace {
         let reach = reach_of(SHELLS - 1);
         let scale = f64::from(vector::largest(to_f32(root))) + reach;
         let slack = ROUNDING * scale;
-        // Not `and_then`: its closure would not always be inlined, and then be compiled without the path's instructions.
-        let Some(skin) = how.skin.as_ref() else { return Self::default() };
-        let Some((up, facet)) = skin.facet(&root, SAME_SIDE) else { return Self::default() };
+        let Some((up, facet)) = how.skin.as_ref().and_then(|skin| skin.facet(&root, SAME_SIDE)) else {
+            return Self::default();
+        };
         // Shortened by more than the rounding to f32 may lengthen it.
         let up = to_f32(up * (1.0 - 1e-6));
         let mut above = Above {

@@ -42,9 +42,6 @@ pub(super) struct Blocked {
 /// A point of the plane, along u and v.
 pub(super) type P2 = [f64; 2];
 
-/// Above the rounding errors of angles and of points along a piece, relative to what they are computed from.
-const DOUBT: f64 = 1e-12;
-
 impl Sector {
     /// The direction after a turn by `angle`.
     pub(super) fn direction(&self, angle: f64) -> DVec3 {
@@ -55,23 +52,11 @@ impl Sector {
         self.u * cosine + self.v * sine
     }
 
-    /// Calls `found` with each interval of angles that the triangle blocks, if it stops a turn; may leave out those that stop
-    /// none before the direction `until`.
-    pub(super) fn stops_before(&self, until: P2, corners: &[DVec3; 3], mut found: impl FnMut(Stops)) {
-        if self.half != 0.0 {
-            self.blocked_by(corners, |blocked| blocked.stops().into_iter().for_each(&mut found));
-            return;
-        }
-        let (heights, flat) = self.seen(corners);
-        let Some([p, q]) = slice(&heights, 0.0, flat) else { return };
+    /// Calls `found` with each interval of angles that the triangle blocks; may leave out intervals behind the segment
+    /// and those that stop no turn before the direction `until`.
+    pub(super) fn blocked_before(&self, until: P2, corners: &[DVec3; 3], mut found: impl FnMut(Blocked)) {
         // A point at radius r that lies `back` beyond the ray at angle α is past α by asin(back/r) ≥ back/r.
-        let side = |p: P2| until[0] * p[1] - until[1] * p[0];
-        // More than the rounding error of the ends of its parts, relative to `p` and `q`.
-        let doubt = DOUBT * (p[0].abs() + p[1].abs() + q[0].abs() + q[1].abs() + self.back);
-        if p[1].max(q[1]) < -doubt || (p[1].min(q[1]) > doubt && side(p).min(side(q)) > self.back + doubt) {
-            return;
-        }
-        let over = |p: P2| side(p) >= self.back;
+        let over = |p: P2| until[0] * p[1] - until[1] * p[0] >= self.back;
         let counts = |p: P2, q: P2| match [p[1] < 0.0, q[1] < 0.0] {
             [true, true] => false,
             [false, false] => !(over(p) && over(q)),
@@ -79,29 +64,28 @@ impl Sector {
             [true, false] => p[0] * q[1] >= q[0] * p[1] || !over(q),
             [false, true] => q[0] * p[1] >= p[0] * q[1] || !over(p),
         };
-        self.within_reach([p, q], |p, q| {
-            if counts(p, q) {
-                Stops::between(p, q).into_iter().for_each(&mut found);
-            }
-        });
+        self.blocked(corners, counts, &mut found);
     }
 
-    /// Heights of corners above the plane, and a function of their positions along it.
-    fn seen<'c>(&'c self, corners: &'c [DVec3; 3]) -> ([f64; 3], impl Fn(usize) -> P2 + 'c) {
+    /// Calls `found` with each interval of angles that the triangle blocks.
+    pub(super) fn blocked_by(&self, corners: &[DVec3; 3], mut found: impl FnMut(Blocked)) {
+        self.blocked(corners, |_, _| true, &mut found);
+    }
+
+    /// As [`Sector::blocked_by`], restricted to pieces for which `counts` holds where the segment has no thickness.
+    fn blocked(&self, corners: &[DVec3; 3], counts: impl Fn(P2, P2) -> bool, mut found: impl FnMut(Blocked)) {
         let heights = corners.map(|corner| self.n.dot(&(corner - self.pivot)));
         let flat = |k: usize| {
             let from_pivot = corners[k] - self.pivot;
             [self.u.dot(&from_pivot), self.v.dot(&from_pivot)]
         };
-        (heights, flat)
-    }
-
-    /// Calls `found` with each interval of angles that the triangle blocks.
-    pub(super) fn blocked_by(&self, corners: &[DVec3; 3], mut found: impl FnMut(Blocked)) {
-        let (heights, flat) = self.seen(corners);
         if self.half == 0.0 {
             if let Some(piece) = slice(&heights, 0.0, flat) {
-                self.within_reach(piece, |p, q| found(Blocked::between(p, q)));
+                self.within_reach(piece, |p, q| {
+                    if counts(p, q) {
+                        found(Blocked::between(p, q));
+                    }
+                });
             }
             return;
         }
@@ -110,7 +94,14 @@ impl Sector {
         if low > self.half || high < -self.half {
             return;
         }
-        self.blocked_in_slab(&heights, [flat(0), flat(1), flat(2)], found);
+        self.blocked_in_slab(
+            &heights,
+            corners.each_ref().map(|corner| {
+                let from_pivot = *corner - self.pivot;
+                [self.u.dot(&from_pivot), self.v.dot(&from_pivot)]
+            }),
+            found,
+        );
     }
 
     /// As [`Sector::blocked_by`] for a thick segment.
@@ -171,9 +162,8 @@ impl Sector {
                 found(at(from), at(to));
             }
         };
-        let inner = if self.inner > 0.0 { inside_circle(p, q, self.inner) } else { None };
-        match inner {
-            Some([near, far]) => {
+        match inside_circle(p, q, self.inner) {
+            Some([near, far]) if self.inner > 0.0 => {
                 if near > from {
                     part(from, near.min(to));
                 }
@@ -181,64 +171,23 @@ impl Sector {
                     part(far.max(from), to);
                 }
             }
-            None => part(from, to),
-        }
-    }
-}
-
-/// How an interval of angles stops a turn from angle 0.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Stops {
-    /// It contains the start.
-    AtStart,
-    /// It begins at this angle above 0, at this distance from the pivot.
-    At(f64, f64),
-}
-
-impl Stops {
-    /// As [`Blocked::between`] and [`Blocked::stops`], with one angle computed instead of two where signs tell the rest.
-    pub(super) fn between(p: P2, q: P2) -> Option<Self> {
-        let turn = p[0] * q[1] - p[1] * q[0];
-        let (first, last) = if turn >= 0.0 { (p, q) } else { (q, p) };
-        let size = |p: P2| p[0].abs() + p[1].abs();
-        let is_clear = |p: P2| p[1].abs() > DOUBT * size(p);
-        if !(turn.abs() > DOUBT * size(p) * size(q) && is_clear(p) && is_clear(q)) {
-            return Blocked::between(p, q).stops();
-        }
-        match [first[1] > 0.0, last[1] > 0.0] {
-            [true, _] => Some(Self::At(angle(first), radius(first))),
-            [false, true] => Some(Self::AtStart),
-            [false, false] => None,
+            _ => part(from, to),
         }
     }
 }
 
 impl Blocked {
-    /// How it stops a turn; `None` if it does not.
-    pub(super) fn stops(&self) -> Option<Stops> {
-        if (self.lo <= 0.0 && self.hi >= 0.0) || self.hi >= std::f64::consts::TAU {
-            return Some(Stops::AtStart);
-        }
-        (self.lo > 0.0).then_some(Stops::At(self.lo, self.lo_radius))
-    }
-
     /// The angles of a straight piece between two points, neither at the pivot.
-    pub(super) fn between(p: P2, q: P2) -> Self {
+    fn between(p: P2, q: P2) -> Self {
         let left = p[0] * q[1] - p[1] * q[0] >= 0.0;
         let (first, last) = if left { (p, q) } else { (q, p) };
+        let angle = |p: P2| libm::atan2(p[1], p[0]);
+        let radius = |p: P2| (p[0] * p[0] + p[1] * p[1]).sqrt();
         let (lo, hi) = (angle(first), angle(last));
         // An interval across the opposite direction continues past π.
         let hi = if hi < lo { hi + std::f64::consts::TAU } else { hi };
         Self { lo, hi, lo_radius: radius(first), hi_radius: radius(last) }
     }
-}
-
-fn angle(p: P2) -> f64 {
-    libm::atan2(p[1], p[0])
-}
-
-fn radius(p: P2) -> f64 {
-    (p[0] * p[0] + p[1] * p[1]).sqrt()
 }
 
 /// Where the plane at height `level` cuts a triangle with corners at these heights. A corner at the level counts as

@@ -2,7 +2,7 @@
 //! something.
 
 use super::crossing::{Crossing, corners, first_crossing};
-use super::sector::{Sector, Stops};
+use super::sector::{Blocked, Sector};
 use super::triangle_filter::Wedge;
 use super::{ContactMethod, perpendicular};
 use numerics::tree::{Block, Cuboid, TriangleTree};
@@ -213,10 +213,10 @@ fn first_stop(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop {
             lanes &= lanes - 1;
             let mut stuck = false;
             let mut next = None;
-            sector.stops_before(until, &corners(block, lane), |stops| match stops {
-                Stops::AtStart => stuck = true,
-                Stops::At(lo, radius) => {
-                    let angle = (lo - sector.back / radius).max(0.0);
+            sector.blocked_before(until, &corners(block, lane), |blocked| {
+                stuck |= blocked.blocks_start();
+                if blocked.lo > 0.0 {
+                    let angle = (blocked.lo - sector.back / blocked.lo_radius).max(0.0);
                     next = Some(next.map_or(angle, |least: f64| least.min(angle)));
                 }
             });
@@ -267,6 +267,13 @@ pub(super) fn first_gap(sector: &Sector, nearby: &Nearby<'_>, most: f64, kept: i
         }
     }
     (angle <= most).then_some(angle)
+}
+
+impl Blocked {
+    /// Whether it contains the angle 0.
+    fn blocks_start(&self) -> bool {
+        (self.lo <= 0.0 && self.hi >= 0.0) || self.hi >= std::f64::consts::TAU
+    }
 }
 
 impl Sector {

@@ -1,6 +1,5 @@
 //! One sector and one triangle.
 
-use super::super::sector::{Blocked, P2, Stops};
 use super::*;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 
@@ -131,62 +130,4 @@ fn a_thick_segment_is_stopped_beside_its_plane() {
     let thick = Sector { half: 0.02, ..thin };
     let found = first(&thick, &beside).unwrap();
     assert!((found - FRAC_PI_2 / 2.0).abs() < 0.03, "{found}");
-}
-
-/// The signs of coordinates tell of most pieces what two angles would, with the same bits.
-#[test]
-fn a_piece_stops_a_turn_as_its_interval_says() {
-    let values = [0.0, -0.0, 1e-300, -1e-17, 1e-15, -1e-9, 0.5, -0.5, 1.0, -1.0, 3.0];
-    let points: Vec<P2> = values.iter().flat_map(|x| values.map(|y| [*x, y])).filter(|p| *p != [0.0; 2]).collect();
-    let ends = points.iter().flat_map(|p| points.iter().map(move |q| (*p, *q)));
-    let random = (0..20_000).map(|i| {
-        let key = Key::new(5).of(i);
-        let at = |n: u64| [coordinate(key.of(n)), coordinate(key.of(n + 1))];
-        let p = at(0);
-        // Some lie next to the line through the pivot and the other end.
-        let q = if i % 3 == 0 { p.map(|x| x * 0.7 * (1.0 + 1e-15 * coordinate(key.of(4)))) } else { at(2) };
-        (p, q)
-    });
-    let mut kinds = [0; 3];
-    for (p, q) in ends.chain(random) {
-        let stops = Stops::between(p, q);
-        assert_eq!(stops, Blocked::between(p, q).stops(), "{p:?} {q:?}");
-        kinds[match stops {
-            None => 0,
-            Some(Stops::AtStart) => 1,
-            Some(Stops::At(..)) => 2,
-        }] += 1;
-    }
-    assert!(kinds.iter().all(|count| *count > 1000), "{kinds:?}");
-}
-
-/// Of what stops a turn before its goal nothing is left out.
-#[test]
-fn all_that_stops_a_turn_before_its_goal_is_found() {
-    let (mut stopped, mut stuck) = (0, 0);
-    for i in 0..50_000 {
-        let key = Key::new(6).of(i);
-        let u = random_unit(key.of(0));
-        let v = u.cross(&random_unit(key.of(1))).normalize();
-        let inner = if i % 4 == 0 { 0.2 } else { 0.0 };
-        let sector = Sector { inner, back: 0.02, ..sector(u, v, 1.0) };
-        let corners = [2, 3, 4].map(|n| random_vector(key.of(n)));
-        let most = PI * f64::from(key.of(5).f32());
-        let (sine, cosine) = libm::sincos(most);
-        // The least angle before the goal; 0 if the start is blocked.
-        let mut least = [most; 2];
-        let mut add = |which: usize, stops: Stops| {
-            let angle = match stops {
-                Stops::AtStart => -1.0,
-                Stops::At(lo, radius) => (lo - sector.back / radius).max(0.0),
-            };
-            least[which] = least[which].min(angle);
-        };
-        sector.blocked_by(&corners, |blocked| blocked.stops().into_iter().for_each(|stops| add(0, stops)));
-        sector.stops_before([cosine, sine], &corners, |stops| add(1, stops));
-        assert_eq!(least[0], least[1], "{i}");
-        stopped += usize::from((0.0..most).contains(&least[0]));
-        stuck += usize::from(least[0] < 0.0);
-    }
-    assert!(stopped > 1000 && stuck > 1000, "{stopped} {stuck}");
 }
