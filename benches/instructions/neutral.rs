@@ -53,7 +53,7 @@ const fn on_fur(name: &'static str, nodes: &'static [&'static str], output: &'st
 
 /// A case on the block of liquid.
 const fn on_liquid(name: &'static str, nodes: &'static [&'static str]) -> Case {
-    Case { name, nodes, before: &["block"], output: "node.surface", frames: 6 }
+    Case { name, nodes, before: &["block"], output: "node.surface", frames: 10 }
 }
 
 /// A case on the beam that is held.
