@@ -114,7 +114,7 @@ fn first(starts: &[usize], i: usize) -> usize {
     i + 1 + starts[i] - starts[i + 1]
 }
 
-kernel! {
+kernel! { avx512
     /// Factors the columns from `begin` on of one row, whose stored entries `mine` start at column `from`, given the
     /// rows above as their starts and values.
     fn finish(above: (&[usize], &[f64]), mine: &mut [f64], from: usize, begin: usize) -> () = finish_body;
@@ -140,7 +140,7 @@ fn finish_body((starts, above): (&[usize], &[f64]), mine: &mut [f64], from: usiz
     }
 }
 
-kernel! {
+kernel! { avx512
     /// Inner product of two long vectors.
     fn inner_product(a: &[f64], b: &[f64]) -> f64 = inner_product_body;
 }
@@ -159,7 +159,7 @@ fn inner_product_body(a: &[f64], b: &[f64]) -> f64 {
     (((a + b) + (c + d)) + ((e + f) + (g + h))) + tail
 }
 
-kernel! {
+kernel! { avx512
     /// Forward and back substitution.
     fn solve(starts: &[usize], values: &[f64], x: &mut [f64]) -> () = solve_body;
 }

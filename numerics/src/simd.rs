@@ -113,11 +113,34 @@ fn widest_level() -> Level {
     Level::Baseline
 }
 
-/// A function that runs `body`, an `#[inline(always)]` function of the same arguments, compiled for
-/// the path that is its first argument:
-/// `kernel! { pub fn bend_group(group: &Group<'_>) -> Reached = group_body; }`
+/// A function that runs `body`, an `#[inline(always)]` function of the same arguments, compiled for the path that is its
+/// first argument: `kernel! { pub fn settle(hairs: &[Hair]) -> Reached = settle_body; }`
+///
+/// Compiled for the baseline and AVX2. `kernel! { avx512 pub fn … }` compiles a copy for AVX-512 as well: for kernels that
+/// were measured to run faster so. Most do not, for where lanes are gathered and scattered, sixteen of them take longer
+/// than twice eight, and each copy is compiled in every build.
 #[macro_export]
 macro_rules! kernel {
+    (avx512 $(#[$meta:meta])* $vis:vis fn $name:ident $(<$life:lifetime>)? ($($arg:ident: $type:ty),* $(,)?)
+     $(-> $out:ty)? = $body:path;) => {
+        $(#[$meta])*
+        #[allow(unsafe_code)]
+        $vis fn $name $(<$life>)? (path: $crate::simd::Path, $($arg: $type),*) $(-> $out)? {
+            $crate::kernel! { fn narrower $(<$life>)? ($($arg: $type),*) $(-> $out)? = $body; }
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx2,avx512f,avx512bw,avx512cd,avx512dq,avx512vl")]
+                fn avx512 $(<$life>)? ($($arg: $type),*) $(-> $out)? {
+                    $body($($arg),*)
+                }
+                if path.level() == $crate::simd::Level::Avx512 {
+                    // SAFETY: a `Path` of this level exists only on a CPU with these features.
+                    return unsafe { avx512($($arg),*) };
+                }
+            }
+            narrower(path, $($arg),*)
+        }
+    };
     ($(#[$meta:meta])* $vis:vis fn $name:ident $(<$life:lifetime>)? ($($arg:ident: $type:ty),* $(,)?)
      $(-> $out:ty)? = $body:path;) => {
         $(#[$meta])*
@@ -129,16 +152,9 @@ macro_rules! kernel {
                 fn avx2 $(<$life>)? ($($arg: $type),*) $(-> $out)? {
                     $body($($arg),*)
                 }
-                #[target_feature(enable = "avx2,avx512f,avx512bw,avx512cd,avx512dq,avx512vl")]
-                fn avx512 $(<$life>)? ($($arg: $type),*) $(-> $out)? {
-                    $body($($arg),*)
-                }
-                match path.level() {
-                    // SAFETY: a `Path` of this level exists only on a CPU with these features.
-                    $crate::simd::Level::Avx512 => return unsafe { avx512($($arg),*) },
-                    // SAFETY: likewise.
-                    $crate::simd::Level::Avx2 => return unsafe { avx2($($arg),*) },
-                    $crate::simd::Level::Baseline => {}
+                if path.level() >= $crate::simd::Level::Avx2 {
+                    // SAFETY: a `Path` of this level or above exists only on a CPU with AVX2.
+                    return unsafe { avx2($($arg),*) };
                 }
             }
             let _ = path;

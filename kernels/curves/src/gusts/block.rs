@@ -16,7 +16,7 @@ const OFF_LATTICE: Vec3 = [0.37, 0.61, 0.13];
 /// Groups of sixteen points in a block.
 pub(super) const ROWS: usize = BLOCK / LANES;
 
-kernel! {
+kernel! { avx512
     /// Adds the influences of the regions of `near`, which may reach up to [`BLOCK`] points within `bounds`, times
     /// `factors` to `out`; returns how many points any influence reaches.
     pub(super) fn block_values(

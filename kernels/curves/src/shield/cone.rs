@@ -37,7 +37,7 @@ const ASIDE: [f32; 2] = [3e-5, 2e-5];
 /// Distance outside the disc at which edges are clipped before the perspective division, in radii.
 const MARGIN: f32 = 2.0;
 
-kernel! {
+kernel! { avx512
     /// Writes the covered fraction of the cone of each CV, with half angle `cone`, to `covered`.
     pub(super) fn cover(
         obstacles: &[Obstacle],
@@ -47,7 +47,7 @@ kernel! {
     ) = body_without_fade;
 }
 
-kernel! {
+kernel! { avx512
     /// The same where what is covered counts by its distance.
     pub(super) fn cover_fading(
         obstacles: &[Obstacle],

@@ -214,7 +214,7 @@ fn share(cvs: &[u32], covered: &[f32]) -> f32 {
     if cvs.is_empty() { 0.0 } else { (sum / cvs.len() as f64) as f32 }
 }
 
-kernel! {
+kernel! { avx512
     /// Twice the area of each triangle.
     fn write_areas(blocks: &[Block], areas: &mut [F32x16]) = write_areas_body;
 }

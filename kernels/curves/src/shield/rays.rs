@@ -7,7 +7,7 @@ use numerics::simd::kernel;
 use numerics::tree::Cuboid;
 use numerics::vector::{Vec3, sub};
 
-kernel! {
+kernel! { avx512
     /// Sets `covered` to 1 for each of up to sixteen CVs that has a collider within its reach upwind.
     pub(super) fn cover(
         obstacles: &[Obstacle],
@@ -16,7 +16,7 @@ kernel! {
     ) = body;
 }
 
-kernel! {
+kernel! { avx512
     /// Sets `covered` for each of up to sixteen CVs to how much the nearest collider within its reach upwind counts.
     pub(super) fn cover_nearest(
         obstacles: &[Obstacle],

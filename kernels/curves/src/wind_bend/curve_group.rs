@@ -30,7 +30,7 @@ pub(super) struct Scratch {
     arc: Vec<F32x16>,
 }
 
-kernel! {
+kernel! { avx512
     /// Writes the bent curves of `group` to `out`, which holds just their points; returns the largest values over them and
     /// those `before`.
     pub(super) fn bend_group(
