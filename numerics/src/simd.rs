@@ -1,8 +1,8 @@
 //! Which vector instructions kernels use: chosen once at run time, without any effect on results.
 //!
-//! `kernel!` compiles a function once for each path, from the same source; the widest that the CPU has is run. Multiplications and additions are never fused and kernels work lane by lane, so every path
-//! gives the same bits. Limit: architectures other than x86-64 only have the baseline path (NEON on
-//! aarch64).
+//! `kernel!` compiles a function from the same source for several paths; the widest that the CPU has is run. Multiplications
+//! and additions are never fused and kernels work lane by lane, so every path gives the same bits. Limit: architectures other
+//! than x86-64 only have the baseline path (NEON on aarch64).
 
 use std::sync::LazyLock;
 use std::{env, error, fmt};
@@ -117,8 +117,8 @@ fn widest_level() -> Level {
 /// first argument: `kernel! { pub fn settle(hairs: &[Hair]) -> Reached = settle_body; }`
 ///
 /// Compiled for the baseline and AVX2. `kernel! { avx512 pub fn … }` compiles a copy for AVX-512 as well: for kernels that
-/// were measured to run faster so. Most do not, for where lanes are gathered and scattered, sixteen of them take longer
-/// than twice eight, and each copy is compiled in every build.
+/// were measured to run faster so. Most do not, for where lanes are gathered and scattered, sixteen at once take longer
+/// than eight twice, and each copy is compiled in every build.
 #[macro_export]
 macro_rules! kernel {
     (avx512 $(#[$meta:meta])* $vis:vis fn $name:ident $(<$life:lifetime>)? ($($arg:ident: $type:ty),* $(,)?)
