@@ -3,7 +3,7 @@
 //! Exact at every key, and the same bits for one value as for sixteen. `Smooth` is a smoothstep on each interval (slope 0
 //! at every key), so it never overshoots. Limit: keys within ±1e30, so that differences do not overflow.
 
-use crate::lanes::{F32x16, LANES, get, set};
+use crate::lanes::{F32x16, LANES};
 use std::{error, fmt};
 
 /// How a ramp interpolates between keys.
@@ -145,19 +145,27 @@ impl Ramp {
         let [x, y] = self.keys[0].map(F32x16::splat);
         let mut found = [x, y, x, y];
         for start in (0..self.keys.len()).step_by(AT_ONCE) {
-            let intervals = self.intervals(start);
-            for lane in 0..LANES {
-                let mut interval = get(&found, lane);
-                for candidate in intervals {
-                    interval = if candidate[0] <= at.0[lane] { candidate } else { interval };
+            for candidate in self.intervals(start) {
+                let begun = at.0.map(|x| if candidate[0] <= x { u32::MAX } else { 0 });
+                for part in 0..4 {
+                    let value = candidate[part].to_bits();
+                    for lane in 0..LANES {
+                        // By bits: of a choice of numbers the compiler may make a branch for each lane.
+                        let before = found[part].0[lane].to_bits();
+                        found[part].0[lane] = f32::from_bits((value & begun[lane]) | (before & !begun[lane]));
+                    }
                 }
-                set(&mut found, lane, interval);
             }
         }
-        F32x16::from_fn(|lane| {
-            let [x0, y0, x1, y1] = get(&found, lane);
-            between([x0, y0], [x1, y1], at.0[lane], self.interpolation)
-        })
+        let [x0, y0, x1, y1] = &found;
+        let mut share = F32x16::from_fn(|lane| way(x0.0[lane], x1.0[lane], at.0[lane]));
+        // One loop for each kind: a branch inside a loop would prevent its vectorisation.
+        match self.interpolation {
+            Interpolation::Linear => {}
+            Interpolation::Smooth => share = F32x16::from_fn(|lane| smooth(share.0[lane])),
+            Interpolation::Constant => return *y0,
+        }
+        F32x16::from_fn(|lane| y0.0[lane] + (y1.0[lane] - y0.0[lane]) * share.0[lane])
     }
 
     /// The intervals that begin at key `start` and the following ones, as pairs of keys; that of the last key is constant,
@@ -173,16 +181,28 @@ impl Ramp {
 }
 
 /// The value at `x` of the interval from key `left` to key `right`, which may be the same key.
-#[inline(always)]
 fn between(left: [f32; 2], right: [f32; 2], x: f32, interpolation: Interpolation) -> f32 {
-    let width = right[0] - left[0];
-    let share = if width > 0.0 { (x - left[0]) / width } else { 0.0 };
+    let share = way(left[0], right[0], x);
     let share = match interpolation {
         Interpolation::Linear => share,
-        Interpolation::Smooth => share * share * (3.0 - 2.0 * share),
-        Interpolation::Constant => 0.0,
+        Interpolation::Smooth => smooth(share),
+        Interpolation::Constant => return left[1],
     };
     left[1] + (right[1] - left[1]) * share
+}
+
+/// The share of the way from `left` to `right` at which `x` lies; 0 if they are one place.
+#[inline(always)]
+fn way(left: f32, right: f32, x: f32) -> f32 {
+    let width = right - left;
+    let share = (x - left) / width;
+    if width > 0.0 { share } else { 0.0 }
+}
+
+/// 3t² − 2t³.
+#[inline(always)]
+fn smooth(t: f32) -> f32 {
+    t * t * (3.0 - 2.0 * t)
 }
 
 #[cfg(test)]

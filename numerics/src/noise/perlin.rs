@@ -9,21 +9,41 @@ use crate::vector::lerp;
 /// Three decorrelated components, each within ±1.04, of mean 0 and rms 0.27.
 #[inline(always)]
 pub(super) fn noise(point: Point, salt: u32) -> [f32; 3] {
-    let [x, y, z] = point.share;
     // Rotated bits of `salt` distinguish equal indices along different axes.
     let sides = |axis: usize| {
         let salt = salt.rotate_left(11 * axis as u32);
         [axis_bits(point.cell[axis], salt), axis_bits(point.cell[axis].wrapping_add(1), salt)]
     };
-    let (hx, hy, hz) = (sides(0), sides(1), sides(2));
-    let (u, v, w) = (fade(x), fade(y), fade(z));
-    let corner = |i: usize, j: usize, k: usize| {
+    let [x, y, z] = point.share;
+    let cell = Cell { sides: [sides(0), sides(1), sides(2)], share: point.share, weights: [fade(x), fade(y), fade(z)] };
+    lerp(cell.face(0), cell.face(1), cell.weights[2])
+}
+
+/// A cell of the lattice around a point: bits of its two sides along each axis, the point's fraction along each, faded too.
+struct Cell {
+    sides: [[u32; 2]; 3],
+    share: [f32; 3],
+    weights: [f32; 3],
+}
+
+// Not closures: one that is called in several places is a function of its own, compiled for the baseline.
+impl Cell {
+    #[inline(always)]
+    fn face(&self, k: usize) -> [f32; 3] {
+        lerp(self.edge(0, k), self.edge(1, k), self.weights[1])
+    }
+
+    #[inline(always)]
+    fn edge(&self, j: usize, k: usize) -> [f32; 3] {
+        lerp(self.corner(0, j, k), self.corner(1, j, k), self.weights[0])
+    }
+
+    #[inline(always)]
+    fn corner(&self, i: usize, j: usize, k: usize) -> [f32; 3] {
+        let ([hx, hy, hz], [x, y, z]) = (self.sides, self.share);
         let bits = point_bits(hx[i] ^ hy[j] ^ hz[k]);
         slopes(bits, [x - i as f32, y - j as f32, z - k as f32])
-    };
-    let edge = |j: usize, k: usize| lerp(corner(0, j, k), corner(1, j, k), u);
-    let face = |k: usize| lerp(edge(0, k), edge(1, k), v);
-    lerp(face(0), face(1), w)
+    }
 }
 
 /// 6t⁵ − 15t⁴ + 10t³: slope and curvature are 0 at both ends.
