@@ -4,7 +4,7 @@
 
 #![allow(clippy::disallowed_methods, reason = "measures time and is no node")]
 
-use bodies::goals::{GoalLimits, HeldBody, goal_shape};
+use bodies::goals::{GoalLimits, HeldBody, HeldBy, goal_shape};
 use bodies::tets::{ClosedSurface, FillSettings, PolygonSurface};
 use curves::lattice::{DeformationLattice, Extrapolation, LatticeBasis, control_points};
 use numerics::random::Key;
@@ -57,7 +57,8 @@ fn main() {
         let Ok(solid) = solid else { continue };
         let rows: Vec<i32> = (0..solid.points.len()).map(|k| if k < surface.len() { k as i32 } else { -1 }).collect();
         let shape: Vec<[f32; 3]> = surface.iter().map(|[x, y, z]| [x + y * y, 0.5 * y, z - 0.5 * x * y]).collect();
-        let held = HeldBody { points: &solid.points, tets: &solid.tets, rows: &rows, shape: &shape };
+        let held =
+            HeldBody { points: &solid.points, tets: &solid.tets, by: HeldBy::Points { rows: &rows, shape: &shape } };
         let mut steps = 0;
         let time = fastest(|| steps = goal_shape(&held, GoalLimits::default()).steps);
         println!(

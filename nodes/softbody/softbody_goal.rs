@@ -8,10 +8,14 @@
 //!
 //! The shape has the points of the body's surface, in their order: the surface mesh from Tetrahedralize, deformed by
 //! Lattice_Deform or by hand. If the body comes with its surface mesh, faces are compared too, otherwise the number of
-//! points.
+//! points. Where a mesh rides along in the tets, as in a cage, it is that mesh, and the tets take the shape that brings it
+//! nearest to the target.
 
-use bodies::goals::{GoalLimits, GoalShape, HeldBody, goal_shape};
+use bodies::embedding::{EmbeddedPoint, embed};
+use bodies::goals::{GoalLimits, GoalShape, HeldBody, HeldBy, goal_shape};
+use bodies::tets::bounds;
 use engine::prelude::*;
+use numerics::vector::DVec3;
 
 use crate::shared::attributes::{ALWAYS, GOAL_FRAME, GOAL_HOLD, GOAL_SHARE, GOAL_START, GOAL_STRENGTH, SURFACE_POINT};
 
@@ -19,8 +23,8 @@ inputs! { INPUTS:
     BODY: Input = Input::one("body", Kind::Tets,
         "The body at rest, from Tetrahedralize. Its `surface_point` says which points are on the surface.");
     SHAPE: Input = Input::one("shape", Kind::Mesh,
-        "The target shape of the surface: the surface mesh from Tetrahedralize with other positions and the same \
-         faces.");
+        "The target shape: the mesh from Tetrahedralize, which is the surface of the tets or rides along in them, with \
+         other positions and the same faces.");
 }
 
 params! { PARAMS:
@@ -53,11 +57,17 @@ metrics! { METRICS:
             where its surface crosses itself or bends sharply, and smooth them.");
     VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume of the body in the shape, relative to its own.");
     IDLE = Metric::new("idle", Unit::None, "1 where `strength` is 0 everywhere, so that the goal does not pull; 0 elsewhere.")
-        .warn_always_above(0.0, "With a `strength` of 0 the body is not pulled towards this shape. Raise `strength`, or \
-            remove the goal.");
+        .warn_always_above(0.0, "`strength` is 0, or its mask is 0 everywhere, so the body is not pulled towards this \
+            shape. Raise `strength`, paint its mask, or remove the goal.");
+    FREE = Metric::new("free_points", Unit::None, "Points of the body that the goal does not pull: those with a `strength` of 0.");
     LATE = Metric::new("late_start", Unit::None, "1 where `start_frame` is not before `frame`; 0 elsewhere.")
         .warn_above(0.0, "The goal starts to pull only when the body should already have its shape, so the body is \
             pulled there at once, or not at all where `hold` is over by then. Set `start_frame` before `frame`.");
+    SHAPE_ERROR = Metric::new("shape_error", Unit::None,
+        "Largest distance from the shape at which the tets hold a mesh that rides along, relative to the size of the shape; \
+         0 where the shape is that of the tets' own surface.")
+        .warn_above(0.02, "The tets are too coarse for this shape: the mesh that rides along stays this share of its size \
+            away from it. Lower `spacing` of Tetrahedralize.");
     CG = Metric::new("cg", Unit::None, "Iterations of conjugate gradients in the solve for the interior.");
     RESIDUAL = Metric::new("residual", Unit::None,
         "Force left on inner points after the solve, relative to the force exerted by the surface.");
@@ -69,10 +79,11 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody_Goal",
-    2,
+    3,
     "Turns a target shape of a body's surface into a goal for the whole body: the interior follows as if it were \
      elastic. Wire it into `goals` of Softbody, and the body reaches the shape at the frame set here. The shape must \
-     have the points and faces of the body's surface.",
+     have the points and faces of the body's surface. Where a mesh rides along in the tets, as in a cage, it must have \
+     those of that mesh; the tets bring it as near to the shape as they can, which `shape_error` says.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -85,14 +96,19 @@ pub(crate) static NODE: Node = Node::new(
 fn cook(cx: &Cx) -> Result<Outputs> {
     let (body, shape) = (cx.part(BODY), cx.part(SHAPE));
     let strength = cx.mask(STRENGTH, body)?;
-    let rows = surface(body, cx.input(BODY).mesh(), shape)?;
+    let mesh = cx.input(BODY).mesh();
+    let held = held(body, mesh, shape)?;
     cx.check_cancelled()?;
-    let held = HeldBody { points: body.positions(), tets: body.tet_corners(), rows, shape: shape.positions() };
     // Cached, as keyed strengths cook every frame.
-    let found = body.kept(Asked::of(body, shape), || Ok(goal_shape(&held, GoalLimits::default())))?;
-    publish(cx, &found);
-    let pulls = strength.value > 0.0 && strength.mask.is_none_or(|mask| mask.iter().any(|share| *share > 0.0));
-    cx.publish(IDLE, if pulls { 0.0 } else { 1.0 });
+    let found = body.kept(Asked::of(body, mesh, shape), || goal(body, &held, shape))?;
+    publish(cx, &found, shape);
+    let pulled = match strength.mask {
+        _ if strength.value <= 0.0 => 0,
+        Some(mask) => mask.iter().filter(|share| **share > 0.0).count(),
+        None => body.point_count(),
+    };
+    cx.publish(IDLE, if pulled == 0 && body.point_count() > 0 { 1.0 } else { 0.0 });
+    cx.publish(FREE, (body.point_count() - pulled) as f64);
     cx.publish(LATE, if cx.get(START_FRAME) < cx.get(FRAME) { 0.0 } else { 1.0 });
     let mut out = body.clone();
     out.set(P, found.points.clone())?;
@@ -106,67 +122,109 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     Ok(GOAL.with(Geometry::from(out)))
 }
 
-/// The row of `shape` to which each point of the body belongs; below 0 inside.
+/// What of the body the shape is a shape of.
+enum Held<'a> {
+    /// Its surface: the row of `shape` to which each point of the body belongs; below 0 inside.
+    Surface(&'a [i32]),
+    /// A mesh that rides along.
+    Riding(&'a Component),
+}
+
+/// What of the body `shape` is a shape of: its surface, if all points of the mesh that comes with it are its own.
 ///
 /// # Errors
-/// If the body does not say, or `shape` is not its surface.
-fn surface<'a>(body: &'a Component, along: Option<&Component>, shape: &Component) -> Result<&'a [i32]> {
+/// If the body does not say, or `shape` is another surface's.
+fn held<'a>(body: &'a Component, mesh: Option<&'a Component>, shape: &Component) -> Result<Held<'a>> {
     let name = SURFACE_POINT.name;
     let Some(rows) = body.get(SURFACE_POINT) else {
         let has = body.describe(name).map_or("which it does not have".into(), |found| format!("which is {found}"));
         return Err(Error::refused(format!("`body` needs `{name}`, {has}"))
             .hint("use the tets from Tetrahedralize, whose `surface_point` says which points are on the surface"));
     };
-    let held = rows.iter().max().and_then(|row| usize::try_from(*row).ok()).map_or(0, |row| row + 1);
+    let points = rows.iter().max().and_then(|row| usize::try_from(*row).ok()).map_or(0, |row| row + 1);
     let counted = |mesh: &Component| format!("{} faces and {} points", mesh.element_count(), mesh.point_count());
-    let fact = match along {
-        Some(along) if along.topology() != shape.topology() || along.point_count() != shape.point_count() => {
-            let (shape, own) = (counted(shape), counted(along));
-            format!("`shape` has {shape}, the surface of `body` {own}, or their topology differs")
+    let rides = |mesh: &Component| {
+        let mut owned = vec![false; mesh.point_count()];
+        rows.iter().filter(|row| **row >= 0).for_each(|row| owned[*row as usize] = true);
+        owned.contains(&false)
+    };
+    let fact = match mesh {
+        Some(mesh) if mesh.topology() != shape.topology() || mesh.point_count() != shape.point_count() => {
+            let of = if points == 0 { "the mesh that rides along in" } else { "the surface of" };
+            format!("`shape` has {}, {of} `body` {}, or their topology differs", counted(shape), counted(mesh))
         }
-        Some(along) if held > along.point_count() => {
-            format!("`{name}` of `body` goes up to {}, but its surface has {} points", held - 1, along.point_count())
+        Some(mesh) if points > mesh.point_count() => {
+            format!("`{name}` of `body` goes up to {}, but its surface has {} points", points - 1, mesh.point_count())
         }
-        None if held != shape.point_count() => {
-            format!("`shape` has {} points, the surface of `body` {held}", shape.point_count())
-        }
-        _ if held == 0 && body.point_count() > 0 => {
-            let fact = format!("`{name}` of `body` is below 0 everywhere: no point of its surface is one of its own");
+        Some(mesh) if rides(mesh) => return Ok(Held::Riding(mesh)),
+        None if points == 0 && body.point_count() > 0 => {
+            let fact = format!(
+                "`{name}` of `body` is below 0 everywhere, and no mesh comes with it: it has no surface to shape"
+            );
             return Err(Error::refused(fact).hint(
-                "goals need a body whose surface is its own: from Tetrahedralize with `method` \"delaunay\" and nothing wired \
-                 into `carry`",
+                "wire the output of Tetrahedralize here: its tets come with their surface, or with the mesh that rides along \
+                 in them",
             ));
         }
-        _ => return Ok(rows),
+        None if points != shape.point_count() => {
+            format!("`shape` has {} points, the surface of `body` {points}", shape.point_count())
+        }
+        _ => return Ok(Held::Surface(rows)),
     };
     Err(Error::refused(fact).hint(
-        "deform the surface mesh in the output of Tetrahedralize: after repairs it differs from the input, and \
-         mirroring reverses its faces",
+        "deform the mesh in the output of Tetrahedralize: after repairs it differs from the input, and mirroring reverses \
+         its faces",
     ))
+}
+
+/// The goal of a body.
+///
+/// # Errors
+/// If a mesh rides along in tets without a volume.
+fn goal(body: &Component, held: &Held<'_>, shape: &Component) -> Result<GoalShape> {
+    let (points, tets, shape) = (body.positions(), body.tet_corners(), shape.positions());
+    let carriers: Vec<EmbeddedPoint>;
+    let by = match held {
+        Held::Surface(rows) => HeldBy::Points { rows, shape },
+        Held::Riding(mesh) => {
+            carriers = embed(points, tets, mesh.positions()).ok_or_else(|| {
+                Error::refused("no tet of `body` has a volume, so none can carry the mesh that comes with them")
+                    .hint("use the tets that Tetrahedralize makes from the mesh")
+            })?;
+            HeldBy::Riding { carriers: &carriers, rest: mesh.positions(), shape }
+        }
+    };
+    Ok(goal_shape(&HeldBody { points, tets, by }, GoalLimits::default()))
 }
 
 /// What a goal's points depend on besides the body's positions and tets. Columns are compared by address; they are kept
 /// alive, so that no address is reused.
 struct Asked {
     rows: Option<Column>,
+    mesh: Option<Column>,
     shape: Option<Column>,
 }
 
 impl Asked {
-    fn of(body: &Component, shape: &Component) -> Self {
+    fn of(body: &Component, mesh: Option<&Component>, shape: &Component) -> Self {
         let column = |part: &Component, name| part.table(Owner::Point).column(name).cloned();
-        Self { rows: column(body, SURFACE_POINT.name), shape: column(shape, P.name) }
+        let mesh = mesh.and_then(|mesh| column(mesh, P.name));
+        Self { rows: column(body, SURFACE_POINT.name), mesh, shape: column(shape, P.name) }
     }
 }
 
 impl PartialEq for Asked {
     fn eq(&self, other: &Self) -> bool {
         let same = |a: &Option<Column>, b: &Option<Column>| a.as_ref().zip(b.as_ref()).is_some_and(|(a, b)| a.same(b));
-        same(&self.rows, &other.rows) && same(&self.shape, &other.shape)
+        let mesh = same(&self.mesh, &other.mesh) || (self.mesh.is_none() && other.mesh.is_none());
+        mesh && same(&self.rows, &other.rows) && same(&self.shape, &other.shape)
     }
 }
 
-fn publish(cx: &Cx, found: &GoalShape) {
+fn publish(cx: &Cx, found: &GoalShape, shape: &Component) {
+    let [low, high] = bounds(shape.positions().iter().map(|p| p.map(f64::from)));
+    let size = (DVec3::from(high) - DVec3::from(low)).norm();
+    cx.publish(SHAPE_ERROR, if found.missed > 0.0 && size > 0.0 { found.missed / size } else { 0.0 });
     cx.publish(INVERTED, found.inverted as f64);
     cx.publish(CG, found.steps as f64);
     cx.publish(RESIDUAL, found.residual);

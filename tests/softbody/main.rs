@@ -6,6 +6,7 @@
 mod accuracy;
 #[path = "../accuracy_table/mod.rs"]
 mod accuracy_table;
+mod cage_goal;
 #[path = "../cooked/mod.rs"]
 mod cooked;
 mod egg;

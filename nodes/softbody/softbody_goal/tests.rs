@@ -1,5 +1,5 @@
 use super::*;
-use bodies::tets::{ClosedSurface, FillSettings, PolygonSurface};
+use bodies::tets::{CagedSurface, ClosedSurface, FillSettings, PolygonSurface};
 use conformance::{Bench, bench, conformance};
 use numerics::shapes::{self, Polygons};
 
@@ -134,8 +134,14 @@ fn a_body_without_a_valid_surface_point_is_refused() {
         tets.set_column(Owner::Point, "surface_point", column).unwrap();
     });
     assert_eq!(numbers, "`body` needs `surface_point`, which is one float for each point");
-    let none = with(|tets| tets.edit(SURFACE_POINT).unwrap().fill(-1));
-    assert_eq!(none, "`surface_point` of `body` is below 0 everywhere: no point of its surface is one of its own");
+    let mut alone = body();
+    alone.remove(Kind::Mesh);
+    alone.part_mut(Kind::Tets).unwrap().edit(SURFACE_POINT).unwrap().fill(-1);
+    let none = making(alone, ball()).try_cook().unwrap_err().fact;
+    assert_eq!(
+        none,
+        "`surface_point` of `body` is below 0 everywhere, and no mesh comes with it: it has no surface to shape"
+    );
     let far = with(|tets| tets.edit(SURFACE_POINT).unwrap()[0] = 7000);
     assert!(far.starts_with("`surface_point` of `body` goes up to 7000, but its surface has "));
 }
@@ -163,7 +169,10 @@ fn a_masked_strength_is_a_share_for_each_particle() {
     let (upper, shares) = masked(|p| if p[1] > 0.0 { 0.5 } else { 0.0 });
     assert_eq!(upper.part(Kind::Tets).get(GOAL_SHARE), Some(&shares[..]));
     assert_eq!(upper.part(Kind::Tets).get(GOAL_STRENGTH), Some(&[50.0][..]));
-    assert_eq!((upper.metrics["idle"], masked(|_| 0.0).0.metrics["idle"]), (0.0, 1.0));
+    let free = shares.iter().filter(|share| **share == 0.0).count() as f64;
+    assert_eq!((upper.metrics["idle"], upper.metrics["free_points"]), (0.0, free));
+    let none = masked(|_| 0.0).0.metrics;
+    assert_eq!((none["idle"], none["free_points"]), (1.0, shares.len() as f64));
     assert_eq!(making(body(), ball()).cook().part(Kind::Tets).get(GOAL_SHARE), None);
 }
 
@@ -173,4 +182,39 @@ fn a_start_that_is_not_before_the_frame_is_published() {
     assert_eq!([12.0, 24.0, 30.0].map(|start| late(start).metrics["late_start"]), [0.0, 1.0, 1.0]);
     assert_eq!(late(12.0).part(Kind::Tets).get(GOAL_START), Some(&[12.0][..]));
     assert_eq!(making(body(), ball()).cook().part(Kind::Tets).get(GOAL_START), Some(&[ALWAYS][..]));
+}
+
+/// The ball as a mesh that rides along in a cage.
+fn caged() -> Geometry {
+    let ball = ball();
+    let faces = ball.faces().unwrap();
+    let surface = PolygonSurface { starts: faces.runs.starts(), corners: &faces.corners, points: ball.positions() };
+    let solid = CagedSurface::of(surface, 0.5, false).unwrap().fill().tets;
+    let mut tets = Component::tets(solid.tets, solid.points).unwrap();
+    let rows = vec![-1; tets.point_count()];
+    tets.set(SURFACE_POINT, rows).unwrap();
+    Geometry::from(tets).with(ball)
+}
+
+#[test]
+fn a_caged_body_takes_the_shape_of_the_mesh_that_rides_along() {
+    let sheared: Map = |[x, y, z]| [1.0 + 0.5 * x - y, 0.25 * z + 2.0 * y, 0.75 * z + 0.125 * x];
+    let out = making(caged(), moved(ball(), sheared)).cook();
+    for (rest, point) in caged().tets().unwrap().positions().iter().zip(out.part(Kind::Tets).positions()) {
+        let at = sheared(rest.map(f64::from));
+        assert!((0..3).all(|k| (f64::from(point[k]) - at[k]).abs() < 2e-6), "{point:?}, expected {at:?}");
+    }
+    assert!(out.metrics["shape_error"] < 1e-6, "{:?}", out.metrics);
+    // A wave shorter than the tets.
+    let wavy = moved(ball(), |[x, y, z]| [x, y + 0.3 * libm::sin(20.0 * x), z]);
+    let out = making(caged(), wavy).cook();
+    assert!(out.metrics["shape_error"] > 0.02, "{:?}", out.metrics);
+    assert_eq!(out.metrics["loose_points"], 0.0);
+}
+
+#[test]
+fn a_shape_of_another_mesh_than_the_one_that_rides_along_is_refused() {
+    let other = mesh(&shapes::sphere([1.0; 3], 4));
+    let fact = making(caged(), other).try_cook().unwrap_err().fact;
+    assert!(fact.contains("the mesh that rides along in `body`"), "{fact}");
 }

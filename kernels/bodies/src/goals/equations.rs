@@ -26,8 +26,9 @@ pub(super) struct Equations {
 }
 
 impl Equations {
-    /// For points that have prescribed displacements `held_by` or are free.
-    pub(super) fn of(points: &[Vec3], tets: &[[u32; 4]], held_by: &[Option<DVec3>]) -> Self {
+    /// For points that have prescribed displacements `held_by` or are free; `ties` are edges besides those of tets, lower
+    /// end first, which may lead to held points beyond `points`.
+    pub(super) fn of(points: &[Vec3], tets: &[[u32; 4]], ties: &[([u32; 2], f64)], held_by: &[Option<DVec3>]) -> Self {
         let mut rows = 0_u32;
         let number = |held: &Option<DVec3>| {
             held.is_none().then(|| {
@@ -36,7 +37,7 @@ impl Equations {
             })
         };
         let free: Vec<Option<u32>> = held_by.iter().map(number).collect();
-        let edges = edges(points, tets, &free);
+        let edges = edges(points, tets, ties, &free);
         let rows = rows as usize;
         let mut starts = vec![0_u32; rows + 1];
         let ends = |[a, b]: [u32; 2]| [(a, b), (b, a)].map(|(from, to)| (free[from as usize], to));
@@ -81,26 +82,42 @@ impl Equations {
     }
 }
 
-/// Weights of the edges with a free end, sorted; those of an edge's tets are summed in order.
-fn edges(points: &[Vec3], tets: &[[u32; 4]], free: &[Option<u32>]) -> Vec<([u32; 2], f64)> {
+/// Weights of the edges of a tet, lower ends first.
+fn edges_of(points: &[Vec3], tet: &[u32; 4]) -> [([u32; 2], f64); 6] {
     const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
-    let of_tet = |tet: &[u32; 4]| {
-        let weights = weights(&tet.map(|corner| points[corner as usize]));
-        EDGES.map(|[k, l]| ([tet[k].min(tet[l]), tet[k].max(tet[l])], weights[k][l]))
-    };
+    let weights = weights(&tet.map(|corner| points[corner as usize]));
+    EDGES.map(|[k, l]| ([tet[k].min(tet[l]), tet[k].max(tet[l])], weights[k][l]))
+}
+
+/// The sum of the weights of each point's edges in tets: how stiff the tets hold it.
+pub(super) fn stiffness(points: &[Vec3], tets: &[[u32; 4]]) -> Vec<f64> {
+    let mut stiffness = vec![0.0; points.len()];
+    for tet in tets {
+        for ([a, b], weight) in edges_of(points, tet) {
+            stiffness[a as usize] += weight;
+            stiffness[b as usize] += weight;
+        }
+    }
+    stiffness
+}
+
+/// Weights of the edges with a free end, sorted; those of an edge's tets are summed in order, then those of `ties`.
+fn edges(points: &[Vec3], tets: &[[u32; 4]], ties: &[([u32; 2], f64)], free: &[Option<u32>]) -> Vec<([u32; 2], f64)> {
     let has_free = |(edge, _): &([u32; 2], f64)| edge[0] != edge[1] && edge.iter().any(|p| free[*p as usize].is_some());
     let parts = parallel::map(tets.chunks(CHUNK), |_, tets| {
-        tets.iter().flat_map(of_tet).filter(has_free).collect::<Vec<([u32; 2], f64)>>()
+        tets.iter().flat_map(|tet| edges_of(points, tet)).filter(has_free).collect::<Vec<([u32; 2], f64)>>()
     });
+    let ties: Vec<([u32; 2], f64)> = ties.iter().copied().filter(has_free).collect();
+    let parts: Vec<&[([u32; 2], f64)]> = parts.iter().map(Vec::as_slice).chain([&ties[..]]).collect();
     // By counting for the lower ends, in linear time; then by the other end.
-    let mut starts = vec![0; points.len() + 1];
-    parts.iter().flatten().for_each(|([low, _], _)| starts[*low as usize + 1] += 1);
-    (0..points.len()).for_each(|point| starts[point + 1] += starts[point]);
+    let mut starts = vec![0; free.len() + 1];
+    parts.iter().copied().flatten().for_each(|([low, _], _)| starts[*low as usize + 1] += 1);
+    (0..free.len()).for_each(|point| starts[point + 1] += starts[point]);
     let mut next = starts.clone();
-    let mut ordered = vec![(0, 0.0); starts[points.len()]];
+    let mut ordered = vec![(0, 0.0); starts[free.len()]];
     for ([low, high], weight) in parts.into_iter().flatten() {
-        ordered[next[low as usize]] = (high, weight);
-        next[low as usize] += 1;
+        ordered[next[*low as usize]] = (*high, *weight);
+        next[*low as usize] += 1;
     }
     let mut edges: Vec<([u32; 2], f64)> = Vec::with_capacity(ordered.len() / 4);
     for (low, ends) in starts.windows(2).enumerate() {

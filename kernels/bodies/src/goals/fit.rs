@@ -1,6 +1,6 @@
-//! The affine map that best fits the motion of the fixed points of a piece.
+//! The affine map that best fits the motion of a piece's points that have targets.
 
-use super::{ConnectedPieces, HeldBody, target};
+use super::{ConnectedPieces, HeldBody};
 use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
 
 /// Regularisation relative to the trace of the covariance: in directions that are thinner than its square root the
@@ -17,7 +17,7 @@ pub(super) struct Affine {
     rests: bool,
 }
 
-/// Sums over the fixed points of a piece.
+/// Sums over the points of a piece that have targets.
 #[derive(Clone, Default)]
 struct Sums {
     count: f64,
@@ -31,28 +31,25 @@ struct Sums {
 }
 
 impl Affine {
-    /// One for each piece; `None` if the piece has no fixed point.
+    /// One for each piece; `None` if none of the piece has a target.
     pub(super) fn of_pieces(held: &HeldBody<'_>, pieces: &ConnectedPieces) -> Vec<Option<Self>> {
         let mut sums = vec![Sums::default(); pieces.count];
-        let held_points = || {
-            let all = held.points.iter().enumerate();
-            all.filter_map(|(point, rest)| Some((pieces.of_point[point] as usize, *rest, target(held, point)?)))
-        };
-        for (piece, rest, goal) in held_points() {
-            let sums = &mut sums[piece];
+        let targets = held.targets();
+        for (point, rest, goal) in &targets {
+            let sums = &mut sums[pieces.of_point[*point] as usize];
             sums.count += 1.0;
             sums.moved |= rest != goal;
-            sums.rest += to_f64(rest);
-            sums.goal += to_f64(goal);
+            sums.rest += to_f64(*rest);
+            sums.goal += to_f64(*goal);
         }
         for sums in &mut sums {
             sums.rest /= sums.count;
             sums.goal /= sums.count;
         }
-        for (piece, rest, goal) in held_points() {
-            let sums = &mut sums[piece];
-            let offset = to_f64(rest) - sums.rest;
-            let goal = to_f64(goal) - sums.goal;
+        for (point, rest, goal) in &targets {
+            let sums = &mut sums[pieces.of_point[*point] as usize];
+            let offset = to_f64(*rest) - sums.rest;
+            let goal = to_f64(*goal) - sums.goal;
             sums.scatter += offset * offset.transpose();
             sums.change += (goal - offset) * offset.transpose();
         }
@@ -71,7 +68,7 @@ impl Affine {
         Self { from: sums.rest, to: sums.goal, stretch, rests: !sums.moved }
     }
 
-    /// Whether all fixed points are at their rest positions.
+    /// Whether all targets are the rest positions.
     pub(super) fn rests(&self) -> bool {
         self.rests
     }

@@ -1,5 +1,6 @@
 use super::*;
-use crate::tets::{ClosedSurface, FillSettings, PolygonSurface};
+use crate::embedding::embed;
+use crate::tets::{CagedSurface, ClosedSurface, FillSettings, PolygonSurface};
 use numerics::random::Key;
 use numerics::shapes::{self, Polygons};
 
@@ -57,7 +58,8 @@ impl Body {
     }
 
     fn within(&self, shape: &[[f32; 3]], limits: GoalLimits) -> GoalShape {
-        goal_shape(&HeldBody { points: &self.points, tets: &self.tets, rows: &self.rows, shape }, limits)
+        let by = HeldBy::Points { rows: &self.rows, shape };
+        goal_shape(&HeldBody { points: &self.points, tets: &self.tets, by }, limits)
     }
 
     /// Largest distance of a point from its image by a map.
@@ -115,7 +117,7 @@ fn the_finite_elements_reproduce_linear_functions() {
     for body in [Body::ball(6), Body::filled(&shapes::block([1.0, 0.2, 0.6], [5, 1, 3]), 0.11)] {
         let at = |point: usize| DVec3::from(sheared(body.points[point].map(f64::from)));
         let held: Vec<_> = (0..body.points.len()).map(|point| (body.rows[point] >= 0).then(|| at(point))).collect();
-        let equations = Equations::of(&body.points, &body.tets, &held);
+        let equations = Equations::of(&body.points, &body.tets, &[], &held);
         let solved = solve(&equations, GoalLimits::default());
         assert!(solved.residual <= 1e-9);
         for point in body.skin()..body.points.len() {
@@ -241,4 +243,71 @@ fn any_number_of_threads_gives_the_same_bits() {
         pool.install(|| body.goal(&shape))
     });
     assert!(runs[0] == runs[1] && runs[0] == runs[2]);
+}
+
+/// A ball in a cage of tets, and how its mesh rides along.
+struct Caged {
+    points: Vec<[f32; 3]>,
+    tets: Vec<[u32; 4]>,
+    carriers: Vec<EmbeddedPoint>,
+    mesh: Vec<[f32; 3]>,
+}
+
+impl Caged {
+    fn ball(spacing: f64) -> Self {
+        let shape = shapes::sphere([1.0; 3], 8);
+        let mesh: Vec<_> = shape.points.iter().map(|p| p.map(|x| x as f32)).collect();
+        let mut starts = vec![0];
+        shape.counts.iter().for_each(|count| starts.push(starts[starts.len() - 1] + count));
+        let surface = PolygonSurface { starts: &starts, corners: &shape.corners, points: &mesh };
+        let solid = CagedSurface::of(surface, spacing, false).unwrap().fill().tets;
+        let carriers = embed(&solid.points, &solid.tets, &mesh).unwrap();
+        Self { points: solid.points, tets: solid.tets, carriers, mesh }
+    }
+
+    fn goal(&self, shape: &[[f32; 3]]) -> GoalShape {
+        let by = HeldBy::Riding { carriers: &self.carriers, rest: &self.mesh, shape };
+        goal_shape(&HeldBody { points: &self.points, tets: &self.tets, by }, GoalLimits::default())
+    }
+
+    fn shape(&self, map: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<[f32; 3]> {
+        self.mesh.iter().map(|p| map(p.map(f64::from)).map(|x| x as f32)).collect()
+    }
+}
+
+#[test]
+fn a_cage_follows_affine_maps_of_its_mesh_exactly_and_keeps_its_bits_at_rest() {
+    let body = Caged::ball(0.4);
+    let still = body.goal(&body.mesh);
+    assert_eq!((still.points, still.steps, still.loose), (body.points.clone(), 0, 0));
+    let out = body.goal(&body.shape(sheared));
+    for (rest, point) in body.points.iter().zip(&out.points) {
+        let at = sheared(rest.map(f64::from));
+        assert!((0..3).all(|k| (f64::from(point[k]) - at[k]).abs() < 2e-6), "{point:?}, expected {at:?}");
+    }
+}
+
+/// A ball of radius 1, bent by a third of it, in cages whose tets are coarser and finer than its faces (0.2).
+#[test]
+fn a_cage_brings_its_mesh_as_near_to_a_shape_as_its_tets_can() {
+    let bent = |[x, y, z]: [f64; 3]| [x + 0.3 * y * y, y, z - 0.2 * x * y];
+    for (spacing, most) in [(0.4, 5.1e-3), (0.2, 1.2e-3), (0.1, 5e-5)] {
+        let body = Caged::ball(spacing);
+        let shape = body.shape(bent);
+        let out = body.goal(&shape);
+        assert!(out.missed < most && out.missed > 0.0, "{spacing}: {:e}", out.missed);
+        assert_eq!((out.inverted, out.loose), (0, 0));
+        // The map's determinant is 1 everywhere.
+        assert!((out.volume_ratio.unwrap() - 1.0).abs() < 1e-3, "{spacing}: {:?}", out.volume_ratio);
+        assert!(out.steps < 200 && out.residual < 1e-9, "{spacing}: {} {}", out.steps, out.residual);
+    }
+}
+
+#[test]
+fn a_mesh_that_is_pressed_into_a_point_gives_a_finite_cage() {
+    let body = Caged::ball(0.4);
+    for at in [[0.5; 3], [1e30; 3]] {
+        let out = body.goal(&vec![at; body.mesh.len()]);
+        assert!(out.points.as_flattened().iter().all(|x| x.is_finite()) && out.residual.is_finite());
+    }
 }
