@@ -103,6 +103,7 @@ impl Stepper<'_> {
             early: 0.0,
             rotational_energy: &[],
             line_search: true,
+            precise: false,
             index: 0,
         };
         let before = OnceCell::new();

@@ -20,6 +20,8 @@ const MOST_IN_CONTACT: u32 = 60;
 const MOST_JAMMED: u32 = 20;
 /// Changes of the loads of friction after which these stay fixed, so that the descent terminates.
 const MOST_RELOADS: u32 = 20;
+/// Motion of a particle, relative to the mean spring length, after which tetrahedra may have become thin.
+const THINNING: f64 = 0.1;
 /// Fraction of the objective that is rounding: smaller decreases are not searched for.
 const ROUNDING: f64 = 1e-12;
 
@@ -83,6 +85,7 @@ impl StageSolver {
         };
         let mut solved = Solved::default();
         let (mut base, mut slow, mut stuck, mut reloads) = (ObjectiveParts::default(), false, false, 0);
+        let mut moved = 0.0;
         loop {
             let stage = &Stage { contacts: &*contacts, ..*stage };
             self.assemble(context, stage, x, true);
@@ -110,17 +113,32 @@ impl StageSolver {
                 solved.caps += u32::from(gave_up && (deep || self.is_unsettled(context.body)));
                 break;
             }
+            // Forces that are left on bodies as wholes are a small part of the residual.
+            let stage = &Stage { precise: (now <= solved.enough || slow) && !deep, ..*stage };
             self.store_noncontact_residual(stage);
             self.use_linearised_forces(stage);
             if !self.direction(context, stage, cached, x, &mut solved) {
                 break;
             }
+            self.volumes.predict(context.body, &self.dx);
             let LineSearch { share, lower, stopped } = self.search(context, stage, x, base);
             self.follow(stage, share, x);
             self.measured = share > 0.0;
             let all = share > LONG && !stopped;
-            (slow, stuck) = (all && base.sum() - lower.sum() <= solved.enough, share == 0.0);
+            slow = all && base.sum() - lower.sum() <= solved.enough;
+            // Only a direction without predictions is sure to lead downhill.
+            stuck = share == 0.0 && !self.used_predicted_pressures();
+            if share == 0.0 {
+                self.forget_pressures();
+            }
             base = lower;
+            moved += share * self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max);
+            if moved > THINNING * context.body.spacing {
+                moved = 0.0;
+                if self.watch_thin(context, x).1 {
+                    base.others = self.other_objective(context, stage, x);
+                }
+            }
         }
         let stage = &Stage { contacts: &*contacts, ..*stage };
         if self.correct_angular_momentum_downhill(context, stage, base, x) && !solved.failed {

@@ -22,8 +22,9 @@ const CG_SHARE: f64 = 0.1;
 /// That with contacts and a line search, where more Newton iterations follow anyway. With 0.2 those of stiff bodies that
 /// hit a surface do not find their loads of friction.
 const CG_SHARE_LINE_SEARCH: f64 = 0.17;
-/// That with contacts whose state is frozen: nothing corrects it later, so slip would drift and piles would jump.
-const CG_SHARE_FROZEN: f64 = 0.02;
+/// That with contacts whose state is frozen: nothing corrects it later, so slip would drift and piles would jump. And that
+/// where only bodies as wholes are out of balance.
+const CG_SHARE_PRECISE: f64 = 0.02;
 /// Noise in the rotation of free pieces that a linear solve may leave, as a fraction of their rotational energy: it
 /// would slow them down.
 const NOISE: f64 = 1e-8;
@@ -58,6 +59,8 @@ pub(super) struct Stage<'a> {
     pub(super) rotational_energy: &'a [f64],
     /// Whether Newton's method runs with a line search and the set of active contacts may change: implicit Euler.
     pub(super) line_search: bool,
+    /// Whether only bodies as wholes are out of balance: linear solves are more precise.
+    pub(super) precise: bool,
     /// Index of the stage in its step, for the iteration counts.
     pub(super) index: usize,
 }
@@ -146,10 +149,13 @@ pub(super) struct StageSolver {
     pub(super) contact_states: Vec<ContactState>,
     /// Friction dual of each contact: predicted friction relative to its bound.
     pub(super) friction_duals: Vec<DVec3>,
-    /// Predicted normal force of each contact, newtons.
+    /// Predicted normal force of each contact, newtons, and pressure of thin tetrahedra, Pa, in ascending order; `None` before
+    /// the first linear system.
     pub(super) predicted_loads: Vec<f64>,
-    /// Contacts that were linearised around another force than the current one, and the difference.
-    pub(super) linearisation_offsets: Vec<(usize, f64)>,
+    pub(super) predicted_pressures: Option<Vec<(u32, f64)>>,
+    /// Contacts and thin tetrahedra that were linearised around another force than the current one, and the difference.
+    pub(super) contact_offsets: Vec<(usize, f64)>,
+    pub(super) thin_offsets: Vec<(usize, f64)>,
     /// Forces of contacts and thin tetrahedra; may be empty: none.
     pub(super) transient_forces: Vec<DVec3>,
     /// For each piece the free group it belongs to: pieces joined by contacts of which none is pinned. And which
@@ -192,6 +198,7 @@ impl StageSolver {
         self.find_free_groups(context, contacts);
         self.friction_duals.clear();
         self.friction_duals.resize(contacts.len(), DVec3::zeros());
+        self.forget_pressures();
         self.predicted_loads.clear();
         self.predicted_loads.extend(contacts.iter().map(|contact| contact.load));
     }
@@ -255,7 +262,7 @@ impl StageSolver {
         }
     }
 
-    /// Applies a fraction `share` of `dx` and updates the predictions of contact forces.
+    /// Applies a fraction `share` of `dx` and updates the predictions of forces.
     pub(super) fn follow(&mut self, stage: &Stage<'_>, share: f64, x: &mut [DVec3]) {
         let known = stage
             .contacts
@@ -267,7 +274,21 @@ impl StageSolver {
             *dual = contact.next_dual(state, dual, &self.dx, share, stage.a);
             *push = contact.predicted_force(state, &self.dx, share);
         }
+        self.volumes.shorten_predicted(share);
+        let pressures = self.thin_tets.iter().map(|thin| (thin.tet, thin.predicted(&self.dx, share)));
+        self.predicted_pressures = Some(pressures.collect());
         x.iter_mut().zip(&self.dx).for_each(|(x, d)| *x += d * share);
+    }
+
+    /// The inventory at `x` if volumes are preserved, and whether tetrahedra that were not watched are thin there; they are watched
+    /// from now on.
+    pub(super) fn watch_thin(&mut self, context: &FrameContext<'_>, x: &[DVec3]) -> (Option<Inventory>, bool) {
+        if self.volumes.is_disabled() {
+            return (None, false);
+        }
+        let seen = Inventory::new(context.body, x, context.volumes);
+        let thinned = self.inventory.watch(&seen, context.body, x, context.volumes);
+        (Some(seen), thinned)
     }
 
     /// Applies the preconditioner to `r`, an approximation of A⁻¹r.
@@ -329,8 +350,8 @@ impl StageSolver {
         let in_contact = !stage.contacts.is_empty();
         let asked = match (in_contact, stage.line_search) {
             (false, _) => CG_SHARE,
-            (true, true) => CG_SHARE_LINE_SEARCH,
-            (true, false) => CG_SHARE_FROZEN,
+            (true, true) if !stage.precise => CG_SHARE_LINE_SEARCH,
+            (true, _) => CG_SHARE_PRECISE,
         };
         let searching = in_contact && stage.line_search;
         let limits = Limits { share: asked, square, cap: bound.min(CG_CAP) };
@@ -411,8 +432,18 @@ mod tests {
             let volumes = solver.volumes.at(&body, &start);
             solver.set_step_start(&context, h, |a, b| springs::distance(&start, a, b), volumes);
             let (y, z, contacts) = (&inertial[..], &start[..], &[][..]);
-            let stage =
-                Stage { y, z, a: h, time: 1.0, contacts, early: 0.0, rotational_energy: &[], line_search, index: 0 };
+            let stage = Stage {
+                y,
+                z,
+                a: h,
+                time: 1.0,
+                contacts,
+                early: 0.0,
+                rotational_energy: &[],
+                line_search,
+                precise: false,
+                index: 0,
+            };
             let (mut cached, mut x) = (CachedCoarseFactor::default(), inertial.clone());
             let solved = if line_search {
                 let enough = StopCriteria { share: 0.05, scale: f64::INFINITY, square: 0.0, first: 0.0 };

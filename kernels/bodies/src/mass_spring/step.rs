@@ -199,13 +199,8 @@ impl Stepper<'_> {
 
     /// Takes stock within a step; returns whether tetrahedra that were not watched are thin at `x`.
     pub(super) fn watch_thin(&mut self, x: &[DVec3]) -> bool {
-        if self.solver.volumes.is_disabled() {
-            return false;
-        }
-        let (body, volumes) = (self.context.body, self.context.volumes);
-        let seen = Inventory::new(body, x, volumes);
-        let thinned = self.solver.inventory.watch(&seen, body, x, volumes);
-        self.solver.latest_inventory = Some(seen);
+        let (seen, thinned) = self.solver.watch_thin(&self.context, x);
+        self.solver.latest_inventory = seen;
         thinned
     }
 

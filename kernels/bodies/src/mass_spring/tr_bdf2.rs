@@ -53,6 +53,7 @@ impl<'a> Step<'a> {
             early,
             rotational_energy: &self.rotational_energy,
             line_search: false,
+            precise: false,
             index,
         }
     }
