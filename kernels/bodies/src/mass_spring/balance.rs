@@ -57,7 +57,6 @@ impl Stepper<'_> {
                 early: 0.0,
                 rotational_energy: &[],
                 line_search: false,
-                precise: false,
                 index: 0,
             };
             let force = self.solver.forces(&self.context, &stage, &motion.x, &motion.v);

@@ -18,13 +18,10 @@ use super::volume::{Inventory, ThinTet, Volumes};
 use numerics::vector::{DVec3, Vec3};
 
 /// Tolerance of linear solves, relative to the residual.
-const CG_SHARE: f64 = 0.1;
-/// That with contacts and a line search, where more Newton iterations follow anyway. With 0.2 those of stiff bodies that
-/// hit a surface do not find their loads of friction.
-const CG_SHARE_LINE_SEARCH: f64 = 0.17;
+pub(super) const CG_SHARE: f64 = 0.1;
 /// That with contacts whose state is frozen: nothing corrects it later, so slip would drift and piles would jump. And that
 /// where only bodies as wholes are out of balance.
-const CG_SHARE_PRECISE: f64 = 0.02;
+pub(super) const CG_SHARE_PRECISE: f64 = 0.02;
 /// Noise in the rotation of free pieces that a linear solve may leave, as a fraction of their rotational energy: it
 /// would slow them down.
 const NOISE: f64 = 1e-8;
@@ -59,8 +56,6 @@ pub(super) struct Stage<'a> {
     pub(super) rotational_energy: &'a [f64],
     /// Whether Newton's method runs with a line search and the set of active contacts may change: implicit Euler.
     pub(super) line_search: bool,
-    /// Whether only bodies as wholes are out of balance: linear solves are more precise.
-    pub(super) precise: bool,
     /// Index of the stage in its step, for the iteration counts.
     pub(super) index: usize,
 }
@@ -241,7 +236,8 @@ impl StageSolver {
             if solved.newton == 0 {
                 solved.first = before;
             }
-            if !self.direction(context, stage, cached, x, &mut solved) {
+            let asked = if stage.contacts.is_empty() { CG_SHARE } else { CG_SHARE_PRECISE };
+            if !self.direction(context, stage, asked, cached, x, &mut solved) {
                 return solved;
             }
             let predicted = std::mem::take(&mut self.r);
@@ -280,15 +276,15 @@ impl StageSolver {
         x.iter_mut().zip(&self.dx).for_each(|(x, d)| *x += d * share);
     }
 
-    /// The inventory at `x` if volumes are preserved, and whether tetrahedra that were not watched are thin there; they are watched
-    /// from now on.
-    pub(super) fn watch_thin(&mut self, context: &FrameContext<'_>, x: &[DVec3]) -> (Option<Inventory>, bool) {
+    /// Takes stock within a step; returns whether tetrahedra that were not watched are thin at `x`.
+    pub(super) fn watch_thin(&mut self, context: &FrameContext<'_>, x: &[DVec3]) -> bool {
         if self.volumes.is_disabled() {
-            return (None, false);
+            return false;
         }
         let seen = Inventory::new(context.body, x, context.volumes);
         let thinned = self.inventory.watch(&seen, context.body, x, context.volumes);
-        (Some(seen), thinned)
+        self.latest_inventory = Some(seen);
+        thinned
     }
 
     /// Applies the preconditioner to `r`, an approximation of A⁻¹r.
@@ -319,12 +315,13 @@ impl StageSolver {
         pushing.fold((0, 0.0), |(count, deepest), state| (count + 1, state.depth.max(deepest)))
     }
 
-    /// Computes the Newton direction `dx` at `x`; `r` becomes the residual of the linear system. Returns false if the
-    /// direction is not finite.
+    /// Computes the Newton direction `dx` at `x` until the residual `r` of the linear system has fallen to the share that is
+    /// `asked`. Returns false if the direction is not finite.
     pub(super) fn direction(
         &mut self,
         context: &FrameContext<'_>,
         stage: &Stage<'_>,
+        asked: f64,
         cached: &mut CachedCoarseFactor,
         x: &[DVec3],
         solved: &mut Solved,
@@ -347,13 +344,7 @@ impl StageSolver {
         let rotational_energy: f64 = free.map(|piece| piece.0).sum();
         let square =
             if rotational_energy > 0.0 { 2.0 * stage.a * stage.a * NOISE * rotational_energy } else { f64::INFINITY };
-        let in_contact = !stage.contacts.is_empty();
-        let asked = match (in_contact, stage.line_search) {
-            (false, _) => CG_SHARE,
-            (true, true) if !stage.precise => CG_SHARE_LINE_SEARCH,
-            (true, _) => CG_SHARE_PRECISE,
-        };
-        let searching = in_contact && stage.line_search;
+        let searching = !stage.contacts.is_empty() && stage.line_search;
         let limits = Limits { share: asked, square, cap: bound.min(CG_CAP) };
         let mut reached = self.gradients(body, cached, limits);
         solved.cg += reached.iterations;
@@ -432,18 +423,8 @@ mod tests {
             let volumes = solver.volumes.at(&body, &start);
             solver.set_step_start(&context, h, |a, b| springs::distance(&start, a, b), volumes);
             let (y, z, contacts) = (&inertial[..], &start[..], &[][..]);
-            let stage = Stage {
-                y,
-                z,
-                a: h,
-                time: 1.0,
-                contacts,
-                early: 0.0,
-                rotational_energy: &[],
-                line_search,
-                precise: false,
-                index: 0,
-            };
+            let stage =
+                Stage { y, z, a: h, time: 1.0, contacts, early: 0.0, rotational_energy: &[], line_search, index: 0 };
             let (mut cached, mut x) = (CachedCoarseFactor::default(), inertial.clone());
             let solved = if line_search {
                 let enough = StopCriteria { share: 0.05, scale: f64::INFINITY, square: 0.0, first: 0.0 };

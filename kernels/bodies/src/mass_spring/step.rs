@@ -169,7 +169,7 @@ impl Stepper<'_> {
                 solved.deepest = deepest(&found, &motion.x);
                 active_set_unchanged = !missed;
             }
-            let thinned = active_set_unchanged && self.watch_thin(&motion.x);
+            let thinned = active_set_unchanged && self.solver.watch_thin(&self.context, &motion.x);
             if !(solved.failed || gained || !active_set_unchanged || thinned) && energies.sum().is_finite() {
                 return (Stepped { solved, ..Stepped::default() }, errors, Some(energies));
             }
@@ -197,13 +197,6 @@ impl Stepper<'_> {
         let seen = self.solver.latest_inventory.take();
         self.solver.inventory =
             seen.unwrap_or_else(|| Inventory::new(self.context.body, &motion.x, self.context.volumes));
-    }
-
-    /// Takes stock within a step; returns whether tetrahedra that were not watched are thin at `x`.
-    pub(super) fn watch_thin(&mut self, x: &[DVec3]) -> bool {
-        let (seen, thinned) = self.solver.watch_thin(&self.context, x);
-        self.solver.latest_inventory = seen;
-        thinned
     }
 
     /// Whether nothing external but gravity and resting goals did work in the step: contacts may be near, but not

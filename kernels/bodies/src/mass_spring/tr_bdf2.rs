@@ -53,7 +53,6 @@ impl<'a> Step<'a> {
             early,
             rotational_energy: &self.rotational_energy,
             line_search: false,
-            precise: false,
             index,
         }
     }
@@ -88,7 +87,7 @@ impl Stepper<'_> {
             },
         };
         let middle = self.trapezoidal_stage(&step);
-        if !self.solver.inventory.watched.is_empty() && self.solver.watch_thin(&self.context, &middle.x).1 {
+        if !self.solver.inventory.watched.is_empty() && self.solver.watch_thin(&self.context, &middle.x) {
             return (middle.solved, None);
         }
         let end = self.backward_difference_stage(&step, &middle);
