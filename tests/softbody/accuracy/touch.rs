@@ -186,8 +186,7 @@ pub(super) fn figures() -> Vec<Figure> {
             largest(hits),
             5e-2,
             "",
-        )
-        .missed(),
+        ),
         Figure::error(
             "A cube thrown at the ground, E 2e4 to 2e6 Pa: error of the speed of its rebound, against 256 steps per frame",
             largest(rebounds),

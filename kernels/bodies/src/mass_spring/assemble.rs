@@ -81,7 +81,7 @@ impl StageSolver {
         self.update_transient_forces(context, stage, x, &v);
         let mut r = std::mem::take(&mut self.r);
         if linear {
-            self.linearise_contacts(stage);
+            self.linearise_steep_forces(stage);
             self.set_rank_one_terms(context, stage);
             self.assemble_system(context, stage, [x, &v], &mut r);
         } else {
@@ -165,31 +165,6 @@ impl StageSolver {
             }
         });
         self.system = system;
-    }
-
-    /// Linearises contact forces around the predicted load instead of the current one, where that is lower.
-    fn linearise_contacts(&mut self, stage: &Stage<'_>) {
-        self.linearisation_offsets.clear();
-        for (index, ((contact, state), push)) in
-            stage.contacts.iter().zip(&mut self.contact_states).zip(&self.predicted_loads).enumerate()
-        {
-            let before = state.normal_force;
-            contact.linearise_at(state, *push);
-            if state.normal_force != before {
-                self.linearisation_offsets.push((index, state.normal_force - before));
-            }
-        }
-    }
-
-    /// Replaces contact forces in the residual by those that the linearisation uses: the right-hand side of the
-    /// linear system.
-    pub(super) fn use_linearised_forces(&mut self, stage: &Stage<'_>) {
-        for (index, more) in &self.linearisation_offsets {
-            let contact = &stage.contacts[*index];
-            for (particle, weight) in contact.sides().filter(|side| !self.system.held[side.0]) {
-                self.r[particle] += contact.normal * (more * weight * stage.a * stage.a);
-            }
-        }
     }
 
     /// Sets up the rank-one terms of volumes, thin tetrahedra and contacts.

@@ -32,6 +32,9 @@ const CLOSED_LIMIT: [f64; 2] = [0.3, 0.1];
 const DUAL_SHRINK: f64 = 0.98;
 /// Two unit vectors with a sum shorter than this are opposite.
 const OPPOSITE: f64 = 1e-9;
+/// Cosine of the largest angle by which slip may turn in a step with constant friction. With a right angle, a point may go
+/// round and round.
+const SAME_DIRECTION: f64 = 0.7;
 /// Slip, in body lengths a second, above which friction is μN; proportional below.
 const CREEP: f64 = 2e-5;
 
@@ -344,7 +347,7 @@ impl ContactConstraint {
             ContactMode::Open => depth <= 0.0,
             ContactMode::Frictionless => stays,
             ContactMode::Sticking => stays && slip.norm() * then.grip <= self.friction * push.max(0.0),
-            ContactMode::Sliding => stays && slip.dot(&then.slip) >= 0.0,
+            ContactMode::Sliding => stays && slip.dot(&then.slip) >= SAME_DIRECTION * slip.norm(),
         }
     }
 

@@ -1,4 +1,4 @@
-//! Implicit Euler with contacts: detect, solve, and repeat while contacts were missed or tetrahedra became thin.
+//! Implicit Euler with contacts: detect, solve, and repeat while contacts were missed.
 //!
 //! Friction is solved with given normal loads: first those of the last step, then those found by the descent, until
 //! they agree (see [`super::friction`]). The result satisfies Coulomb's law for its own normal forces.
@@ -111,7 +111,6 @@ impl Stepper<'_> {
             solved = Solved { residual: again.residual, ..sum(solved, again) };
             (enough.square, enough.first) = (solved.enough, solved.first);
             let (mut found, missed) = self.find_missed(contacts, motion, &x, times);
-            let thinned = self.watch_thin(&x);
             // Contacts that were deep before are being separated. A contact plane at the end of a step may report
             // depth that was none before, as surfaces turn.
             let sank = |c: &&ContactConstraint| {
@@ -121,13 +120,11 @@ impl Stepper<'_> {
             };
             solved.unmet = found.iter().filter(sank).map(|c| -c.clearance(&x, 0.0)).fold(0.0, f64::max);
             solved.deepest = deepest(&found, &x);
-            if round == MOST_ROUNDS || !(missed || thinned) {
+            if round == MOST_ROUNDS || !missed {
                 break;
             }
-            if missed {
-                take_loads(contacts, &mut found);
-                *contacts = found;
-            }
+            take_loads(contacts, &mut found);
+            *contacts = found;
         }
         let v: Vec<DVec3> = x.iter().zip(&z).map(|(x, z)| (x - z) / h).collect();
         // First-order estimate: the change of velocity acts a whole step late.

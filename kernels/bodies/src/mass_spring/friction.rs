@@ -11,9 +11,10 @@ use super::predictor::RigidMotion;
 use super::stage::{FrameContext, Stage, StageSolver};
 use numerics::vector::DVec3;
 
-/// Force and torque left on a body, and change of the sum of its loads, that are tolerated, relative to that sum. It
-/// decides how much a body that hits a surface is slowed.
+/// Force and torque left on a body, and change of the sum of its loads, that are tolerated, relative to that sum. They
+/// decide how much a body that hits a surface is slowed.
 const TOLERATED: f64 = 0.03;
+const TOLERATED_CHANGE: f64 = 0.015;
 /// Factor on that for a body which is pressed from opposite sides: what holds it is its stiffness.
 const PRESSED: f64 = 8.0;
 /// Change of single loads that is tolerated, relative to their sum.
@@ -38,7 +39,7 @@ impl LoadBalance {
     }
 
     pub(super) fn agrees(&self) -> bool {
-        self.change <= TOLERATED && self.single <= TOLERATED_SINGLE
+        self.change <= TOLERATED_CHANGE && self.single <= TOLERATED_SINGLE
     }
 
     /// Whether normal forces are less wrong than the loads.
@@ -96,12 +97,14 @@ impl StageSolver {
         balance
     }
 
-    /// Sets the loads of friction to the normal forces at `x`, with the current velocities; returns the increase of the
-    /// objective of a stage of `a`.
+    /// Sets the loads of friction to their means with the normal forces at `x`, since loads and normal forces that follow each
+    /// other in full may alternate for ever; 0 where contacts are open. Velocities are the current ones. Returns the increase of
+    /// the objective of a stage of `a`.
     pub(super) fn reload(&self, contacts: &mut [ContactConstraint], x: &[DVec3], a: f64, size: f64) -> f64 {
         let more = contacts.iter_mut().map(|contact| {
             let before = contact.friction_energy(&self.v, a, size);
-            contact.load = contact.load_at(x);
+            let now = contact.load_at(x);
+            contact.load = if now > 0.0 { 0.5 * (contact.load + now) } else { 0.0 };
             contact.friction_energy(&self.v, a, size) - before
         });
         a * a * more.sum::<f64>()

@@ -36,6 +36,7 @@ mod search;
 mod springs;
 mod stage;
 mod state;
+mod steep;
 mod step;
 mod system;
 mod tet_springs;

@@ -5,10 +5,13 @@ use super::assemble::velocities;
 use super::contact::ContactConstraint;
 use super::friction::LoadBalance;
 use super::springs;
-use super::stage::{FrameContext, Solved, Stage, StageSolver};
+use super::stage::{CG_SHARE, CG_SHARE_PRECISE, FrameContext, Solved, Stage, StageSolver};
 use super::state::CachedCoarseFactor;
 use numerics::vector::DVec3;
 
+/// Tolerance of linear solves with contacts, relative to the residual: more Newton iterations follow anyway. With 0.2 those
+/// of stiff bodies that hit a surface do not find their loads of friction.
+const CG_SHARE_LINE_SEARCH: f64 = 0.17;
 /// Largest number of step halvings in a line search.
 const HALVINGS: usize = 16;
 /// A line search that took more than this fraction of its step indicates how much decrease is left.
@@ -20,6 +23,8 @@ const MOST_IN_CONTACT: u32 = 60;
 const MOST_JAMMED: u32 = 20;
 /// Changes of the loads of friction after which these stay fixed, so that the descent terminates.
 const MOST_RELOADS: u32 = 20;
+/// Motion of a particle, relative to the mean spring length, after which tetrahedra may have become thin.
+const THINNING: f64 = 0.1;
 /// Fraction of the objective that is rounding: smaller decreases are not searched for.
 const ROUNDING: f64 = 1e-12;
 
@@ -83,6 +88,8 @@ impl StageSolver {
         };
         let mut solved = Solved::default();
         let (mut base, mut slow, mut stuck, mut reloads) = (ObjectiveParts::default(), false, false, 0);
+        // How far particles may have moved since tetrahedra were last watched.
+        let mut moved = f64::INFINITY;
         loop {
             let stage = &Stage { contacts: &*contacts, ..*stage };
             self.assemble(context, stage, x, true);
@@ -106,21 +113,45 @@ impl StageSolver {
             let wanted = (now > solved.enough && !slow) || deep || reload || !balance.is_in_balance();
             let is_cancelled = solved.newton > 0 && (context.cancelled)();
             if !wanted || stuck || is_cancelled || solved.newton >= most {
+                if moved > 0.0 && self.watch_thin(context, x) && !is_cancelled && solved.newton < most {
+                    base.others = self.other_objective(context, stage, x);
+                    (slow, stuck, moved, self.measured) = (false, false, 0.0, true);
+                    continue;
+                }
                 let gave_up = wanted && !stuck && most > MOST;
                 solved.caps += u32::from(gave_up && (deep || self.is_unsettled(context.body)));
                 break;
             }
+            // Forces that are left on bodies as wholes are a small part of the residual.
+            let asked = match (stage.contacts.is_empty(), (now <= solved.enough || slow) && !deep) {
+                (true, _) => CG_SHARE,
+                (false, false) => CG_SHARE_LINE_SEARCH,
+                (false, true) => CG_SHARE_PRECISE,
+            };
             self.store_noncontact_residual(stage);
             self.use_linearised_forces(stage);
-            if !self.direction(context, stage, cached, x, &mut solved) {
+            if !self.direction(context, stage, asked, cached, x, &mut solved) {
                 break;
             }
+            self.volumes.predict(context.body, &self.dx);
             let LineSearch { share, lower, stopped } = self.search(context, stage, x, base);
             self.follow(stage, share, x);
             self.measured = share > 0.0;
             let all = share > LONG && !stopped;
-            (slow, stuck) = (all && base.sum() - lower.sum() <= solved.enough, share == 0.0);
+            slow = all && base.sum() - lower.sum() <= solved.enough;
+            // Only a direction without predictions is sure to lead downhill.
+            stuck = share == 0.0 && !self.used_predicted_pressures();
+            if share == 0.0 {
+                self.forget_pressures();
+            }
             base = lower;
+            moved += share * self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max);
+            if moved > THINNING * context.body.spacing {
+                moved = 0.0;
+                if self.watch_thin(context, x) {
+                    base.others = self.other_objective(context, stage, x);
+                }
+            }
         }
         let stage = &Stage { contacts: &*contacts, ..*stage };
         if self.correct_angular_momentum_downhill(context, stage, base, x) && !solved.failed {

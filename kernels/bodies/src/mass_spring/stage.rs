@@ -18,12 +18,10 @@ use super::volume::{Inventory, ThinTet, Volumes};
 use numerics::vector::{DVec3, Vec3};
 
 /// Tolerance of linear solves, relative to the residual.
-const CG_SHARE: f64 = 0.1;
-/// That with contacts and a line search, where more Newton iterations follow anyway. With 0.2 those of stiff bodies that
-/// hit a surface do not find their loads of friction.
-const CG_SHARE_LINE_SEARCH: f64 = 0.17;
-/// That with contacts whose state is frozen: nothing corrects it later, so slip would drift and piles would jump.
-const CG_SHARE_FROZEN: f64 = 0.02;
+pub(super) const CG_SHARE: f64 = 0.1;
+/// That with contacts whose state is frozen: nothing corrects it later, so slip would drift and piles would jump. And that
+/// where only bodies as wholes are out of balance.
+pub(super) const CG_SHARE_PRECISE: f64 = 0.02;
 /// Noise in the rotation of free pieces that a linear solve may leave, as a fraction of their rotational energy: it
 /// would slow them down.
 const NOISE: f64 = 1e-8;
@@ -146,10 +144,13 @@ pub(super) struct StageSolver {
     pub(super) contact_states: Vec<ContactState>,
     /// Friction dual of each contact: predicted friction relative to its bound.
     pub(super) friction_duals: Vec<DVec3>,
-    /// Predicted normal force of each contact, newtons.
+    /// Predicted normal force of each contact, newtons, and pressure of thin tetrahedra, Pa, in ascending order; `None` before
+    /// the first linear system.
     pub(super) predicted_loads: Vec<f64>,
-    /// Contacts that were linearised around another force than the current one, and the difference.
-    pub(super) linearisation_offsets: Vec<(usize, f64)>,
+    pub(super) predicted_pressures: Option<Vec<(u32, f64)>>,
+    /// Contacts and thin tetrahedra that were linearised around another force than the current one, and the difference.
+    pub(super) contact_offsets: Vec<(usize, f64)>,
+    pub(super) thin_offsets: Vec<(usize, f64)>,
     /// Forces of contacts and thin tetrahedra; may be empty: none.
     pub(super) transient_forces: Vec<DVec3>,
     /// For each piece the free group it belongs to: pieces joined by contacts of which none is pinned. And which
@@ -192,6 +193,7 @@ impl StageSolver {
         self.find_free_groups(context, contacts);
         self.friction_duals.clear();
         self.friction_duals.resize(contacts.len(), DVec3::zeros());
+        self.forget_pressures();
         self.predicted_loads.clear();
         self.predicted_loads.extend(contacts.iter().map(|contact| contact.load));
     }
@@ -234,7 +236,8 @@ impl StageSolver {
             if solved.newton == 0 {
                 solved.first = before;
             }
-            if !self.direction(context, stage, cached, x, &mut solved) {
+            let asked = if stage.contacts.is_empty() { CG_SHARE } else { CG_SHARE_PRECISE };
+            if !self.direction(context, stage, asked, cached, x, &mut solved) {
                 return solved;
             }
             let predicted = std::mem::take(&mut self.r);
@@ -255,7 +258,7 @@ impl StageSolver {
         }
     }
 
-    /// Applies a fraction `share` of `dx` and updates the predictions of contact forces.
+    /// Applies a fraction `share` of `dx` and updates the predictions of forces.
     pub(super) fn follow(&mut self, stage: &Stage<'_>, share: f64, x: &mut [DVec3]) {
         let known = stage
             .contacts
@@ -267,7 +270,21 @@ impl StageSolver {
             *dual = contact.next_dual(state, dual, &self.dx, share, stage.a);
             *push = contact.predicted_force(state, &self.dx, share);
         }
+        self.volumes.shorten_predicted(share);
+        let pressures = self.thin_tets.iter().map(|thin| (thin.tet, thin.predicted(&self.dx, share)));
+        self.predicted_pressures = Some(pressures.collect());
         x.iter_mut().zip(&self.dx).for_each(|(x, d)| *x += d * share);
+    }
+
+    /// Takes stock within a step; returns whether tetrahedra that were not watched are thin at `x`.
+    pub(super) fn watch_thin(&mut self, context: &FrameContext<'_>, x: &[DVec3]) -> bool {
+        if self.volumes.is_disabled() {
+            return false;
+        }
+        let seen = Inventory::new(context.body, x, context.volumes);
+        let thinned = self.inventory.watch(&seen, context.body, x, context.volumes);
+        self.latest_inventory = Some(seen);
+        thinned
     }
 
     /// Applies the preconditioner to `r`, an approximation of A⁻¹r.
@@ -298,12 +315,13 @@ impl StageSolver {
         pushing.fold((0, 0.0), |(count, deepest), state| (count + 1, state.depth.max(deepest)))
     }
 
-    /// Computes the Newton direction `dx` at `x`; `r` becomes the residual of the linear system. Returns false if the
-    /// direction is not finite.
+    /// Computes the Newton direction `dx` at `x` until the residual `r` of the linear system has fallen to the share that is
+    /// `asked`. Returns false if the direction is not finite.
     pub(super) fn direction(
         &mut self,
         context: &FrameContext<'_>,
         stage: &Stage<'_>,
+        asked: f64,
         cached: &mut CachedCoarseFactor,
         x: &[DVec3],
         solved: &mut Solved,
@@ -326,13 +344,7 @@ impl StageSolver {
         let rotational_energy: f64 = free.map(|piece| piece.0).sum();
         let square =
             if rotational_energy > 0.0 { 2.0 * stage.a * stage.a * NOISE * rotational_energy } else { f64::INFINITY };
-        let in_contact = !stage.contacts.is_empty();
-        let asked = match (in_contact, stage.line_search) {
-            (false, _) => CG_SHARE,
-            (true, true) => CG_SHARE_LINE_SEARCH,
-            (true, false) => CG_SHARE_FROZEN,
-        };
-        let searching = in_contact && stage.line_search;
+        let searching = !stage.contacts.is_empty() && stage.line_search;
         let limits = Limits { share: asked, square, cap: bound.min(CG_CAP) };
         let mut reached = self.gradients(body, cached, limits);
         solved.cg += reached.iterations;

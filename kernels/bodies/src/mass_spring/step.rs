@@ -158,19 +158,21 @@ impl Stepper<'_> {
         let start = motion.clone();
         let frozen: Vec<ContactConstraint> = contacts.iter().map(|c| c.frozen(&start.x, &start.v, h, size)).collect();
         let (mut solved, errors) = self.tr_bdf2(motion, times, &frozen, tolerance);
-        let energies = measure(self.solver, &self.context, times[1], motion, true);
-        let gain = energies.sum() - before.sum();
-        let gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
-        let mut active_set_unchanged = frozen.iter().all(|contact| contact.active_set_unchanged(&motion.x, &motion.v));
-        if active_set_unchanged {
-            let (found, missed) = self.find_missed(contacts, &start, &motion.x, times);
-            solved.deepest = deepest(&found, &motion.x);
-            active_set_unchanged = !missed;
-        }
-        let thinned = active_set_unchanged && self.watch_thin(&motion.x);
-        let repeat = solved.failed || gained || !active_set_unchanged || thinned || !energies.sum().is_finite();
-        if !repeat {
-            return (Stepped { solved, ..Stepped::default() }, errors, Some(energies));
+        let (mut gained, mut active_set_unchanged) = (false, true);
+        if let Some(errors) = errors {
+            let energies = measure(self.solver, &self.context, times[1], motion, true);
+            let gain = energies.sum() - before.sum();
+            gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
+            active_set_unchanged = frozen.iter().all(|contact| contact.active_set_unchanged(&motion.x, &motion.v));
+            if active_set_unchanged {
+                let (found, missed) = self.find_missed(contacts, &start, &motion.x, times);
+                solved.deepest = deepest(&found, &motion.x);
+                active_set_unchanged = !missed;
+            }
+            let thinned = active_set_unchanged && self.solver.watch_thin(&self.context, &motion.x);
+            if !(solved.failed || gained || !active_set_unchanged || thinned) && energies.sum().is_finite() {
+                return (Stepped { solved, ..Stepped::default() }, errors, Some(energies));
+            }
         }
         motion.clone_from(&start);
         let (again, errors) = self.euler(motion, times, contacts, solved.failed || gained);
@@ -195,18 +197,6 @@ impl Stepper<'_> {
         let seen = self.solver.latest_inventory.take();
         self.solver.inventory =
             seen.unwrap_or_else(|| Inventory::new(self.context.body, &motion.x, self.context.volumes));
-    }
-
-    /// Takes stock within a step; returns whether tetrahedra that were not watched are thin at `x`.
-    pub(super) fn watch_thin(&mut self, x: &[DVec3]) -> bool {
-        if self.solver.volumes.is_disabled() {
-            return false;
-        }
-        let (body, volumes) = (self.context.body, self.context.volumes);
-        let seen = Inventory::new(body, x, volumes);
-        let thinned = self.solver.inventory.watch(&seen, body, x, volumes);
-        self.solver.latest_inventory = Some(seen);
-        thinned
     }
 
     /// Whether nothing external but gravity and resting goals did work in the step: contacts may be near, but not

@@ -59,15 +59,15 @@ impl<'a> Step<'a> {
 }
 
 impl Stepper<'_> {
-    /// Advances `motion` between two `times` with frozen `contacts`; returns the estimated errors of positions too.
-    /// `tolerance`, metres, makes Newton's method converge.
+    /// Advances `motion` between two `times` with frozen `contacts`; returns the estimated errors of positions too, or `None` if it
+    /// stopped halfway, where tetrahedra became thin. `tolerance`, metres, makes Newton's method converge.
     pub(super) fn tr_bdf2(
         &mut self,
         motion: &mut Kinematics,
         times: [f64; 2],
         contacts: &[ContactConstraint],
         tolerance: Option<f64>,
-    ) -> (Solved, Vec<DVec3>) {
+    ) -> (Solved, Option<Vec<DVec3>>) {
         let body = self.context.body;
         let h = (times[1] - times[0]) * self.seconds;
         let start = motion.clone();
@@ -87,6 +87,9 @@ impl Stepper<'_> {
             },
         };
         let middle = self.trapezoidal_stage(&step);
+        if !self.solver.inventory.watched.is_empty() && self.solver.watch_thin(&self.context, &middle.x) {
+            return (middle.solved, None);
+        }
         let end = self.backward_difference_stage(&step, &middle);
         let mut solved = sum(middle.solved, end.solved);
         let mut error = self.unfiltered_error(&step, &middle, &end);
@@ -97,7 +100,7 @@ impl Stepper<'_> {
             self.solver.smooth(body, self.cached, &mut error);
         }
         (motion.x, motion.v) = (end.x, end.v);
-        (solved, error)
+        (solved, Some(error))
     }
 
     /// The trapezoidal rule, from the start to γ of the step.

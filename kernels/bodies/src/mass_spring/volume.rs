@@ -46,6 +46,14 @@ pub(super) struct Volumes {
     pub(super) pressures: Vec<f64>,
     /// Derivative of the pressure with respect to volume within the stage, Pa/m³.
     slopes: Vec<f64>,
+    /// Change of each region's volume from its rest volume, m³, and its dashpot's part of the slope, Pa/m³.
+    changes: Vec<[f64; 2]>,
+    /// Elastic pressure, Pa, and its derivative, with which each region enters the linear system, and the difference of
+    /// that pressure from the current one.
+    tangents: Vec<[f64; 2]>,
+    pub(super) offsets: Vec<f64>,
+    /// Elastic pressure of each region that the last linear system predicts, Pa; empty before the first.
+    predicted: Vec<f64>,
     /// Step coefficient of the stage, seconds, and volumes at its start: dashpots act on (V − those)/a, as for
     /// springs.
     a: f64,
@@ -65,6 +73,28 @@ pub(super) struct ThinTet {
     pub(super) stiffness: f64,
     pub(super) pressure: f64,
     pub(super) energy: f64,
+    pub(super) tet: u32,
+    /// Its stiffness where it begins to be thin, Pa/m³, what it has to gain to be that, and its rest volume, m³.
+    opening: f64,
+    left: f64,
+    rest: f64,
+}
+
+impl ThinTet {
+    /// Linearises the pressure at an `expected` one; returns the difference from the current one, Pa.
+    pub(super) fn linearise(&mut self, expected: f64) -> f64 {
+        let before = self.pressure;
+        if let Some((push, slope)) = tangent(expected / self.opening, self.left, self.rest, [THIN_STIFFENING, THIN]) {
+            (self.pressure, self.stiffness) = (self.opening * push, self.opening * slope);
+        }
+        self.pressure - before
+    }
+
+    /// Pressure that the linearisation predicts after a fraction `share` of the step `dx`, Pa.
+    pub(super) fn predicted(&self, dx: &[DVec3], share: f64) -> f64 {
+        let gains = self.corners.iter().zip(&self.gradient).map(|(corner, g)| g.dot(&dx[*corner as usize]));
+        (self.pressure - self.stiffness * share * gains.sum::<f64>()).max(0.0)
+    }
 }
 
 impl Volumes {
@@ -90,6 +120,10 @@ impl Volumes {
             gradients: vec![DVec3::zeros(); regions.particles.len()],
             pressures: vec![0.0; regions.len()],
             slopes: vec![0.0; regions.len()],
+            changes: vec![[0.0; 2]; regions.len()],
+            tangents: vec![[0.0; 2]; regions.len()],
+            offsets: vec![0.0; regions.len()],
+            predicted: Vec::new(),
             a: f64::INFINITY,
             before: vec![0.0; regions.len()],
             stored: 0.0,
@@ -136,16 +170,17 @@ impl Volumes {
         let Some(partition) = &self.partition else { return };
         let (regions, stiffness, rest, before, a) = (&body.regions, &self.stiffness, &self.rest, &self.before, self.a);
         let gradients = RaggedSlice::new(&regions.starts, &mut self.gradients);
-        let out = (&mut self.pressures[..], &mut self.slopes[..], gradients);
-        let sums = partition.map(out, |part, (pressures, slopes, mut gradients)| {
+        let out = (&mut self.pressures[..], &mut self.slopes[..], &mut self.changes[..], gradients);
+        let sums = partition.map(out, |part, (pressures, slopes, changes, mut gradients)| {
             let (mut stored, mut damped) = (0.0, 0.0);
-            let regions_here = partition.range(part).zip(pressures).zip(slopes).zip(gradients.iter_mut());
-            for (((region, pressure), slope), mine) in regions_here {
+            let regions_here = partition.range(part).zip(pressures).zip(slopes).zip(changes).zip(gradients.iter_mut());
+            for ((((region, pressure), slope), change), mine) in regions_here {
                 let volume = regions.measure(region, x, mine);
                 let k = stiffness[region];
                 let (push, steep, energy) =
                     stiffened(volume - rest[region], rest[region], [STIFFENING, STIFFENING_END]);
                 let (dashed, more) = (k * regions.damping[region] / a, volume - before[region]);
+                *change = [volume - rest[region], dashed];
                 *pressure = k * push + dashed * more;
                 *slope = k * steep + dashed;
                 stored += k * energy;
@@ -159,6 +194,45 @@ impl Volumes {
     /// Energy that the regions' dashpots take in a step of `h` seconds at the rate last measured, joules.
     pub(super) fn dissipated(&self, h: f64) -> f64 {
         if self.a > 0.0 { 2.0 * self.damped * h / self.a } else { 0.0 }
+    }
+
+    /// Forgets predictions.
+    pub(super) fn forget(&mut self) {
+        self.predicted.clear();
+    }
+
+    /// Linearises the elastic pressures, as last measured, at the predicted ones.
+    pub(super) fn linearise(&mut self) {
+        for (region, [change, dashed]) in self.changes.iter().enumerate() {
+            let (k, rest, range) = (self.stiffness[region], self.rest[region], [STIFFENING, STIFFENING_END]);
+            let (now, slope, _) = stiffened(*change, rest, range);
+            let predicted = self.predicted.get(region).and_then(|expected| tangent(expected / k, *change, rest, range));
+            let (push, slope) = predicted.unwrap_or((now, slope));
+            self.offsets[region] = k * (push - now);
+            self.tangents[region] = [k * push, k * slope];
+            self.slopes[region] = k * slope + dashed;
+        }
+    }
+
+    /// Predicts the elastic pressures after a step `dx`, with the gradients as last measured.
+    pub(super) fn predict(&mut self, body: &SoftBody, dx: &[DVec3]) {
+        let Some(partition) = &self.partition else { return };
+        let (regions, gradients, tangents) = (&body.regions, &self.gradients, &self.tangents);
+        self.predicted.resize(tangents.len(), 0.0);
+        partition.for_each(&mut self.predicted[..], |part, out: &mut [f64]| {
+            for (region, out) in partition.range(part).zip(out) {
+                let mine = &gradients[regions.starts[region] as usize..];
+                let gains = regions.of(region).iter().zip(mine).map(|(particle, g)| g.dot(&dx[*particle as usize]));
+                *out = tangents[region][0] + tangents[region][1] * gains.sum::<f64>();
+            }
+        });
+    }
+
+    /// Reduces the predictions to those of a fraction `share` of the step.
+    pub(super) fn shorten_predicted(&mut self, share: f64) {
+        for (predicted, [push, _]) in self.predicted.iter_mut().zip(&self.tangents) {
+            *predicted = push + (*predicted - push) * share;
+        }
     }
 
     /// Weight of each region's rank-one term in a stage of `a`, as last measured.
@@ -179,6 +253,10 @@ impl Volumes {
             let stiffness = OPENING * self.share * body.moduli[tet] / rest[tet].max(f64::MIN_POSITIVE);
             let (push, slope, energy) = barrier(left, rest[tet]);
             let thin = ThinTet {
+                tet: tet as u32,
+                opening: stiffness,
+                left,
+                rest: rest[tet],
                 corners,
                 gradient: opening(at),
                 stiffness: stiffness * slope,
@@ -209,6 +287,19 @@ fn stiffened(change: f64, rest: f64, [doubled, end]: [f64; 2]) -> (f64, f64, f64
     let (push, slope, energy) = curved(end);
     let more = change.abs() - end;
     ((push + slope * more).copysign(change), slope, energy + push * more + 0.5 * slope * more * more)
+}
+
+/// The tangent to [`stiffened`] where it resists with `expected`: its value and its derivative at `change`. `None` where that is
+/// no smaller change, and where resistance no longer grows. Where resistance is `expected` to have the other sign, the
+/// tangent is that at rest.
+fn tangent(expected: f64, change: f64, rest: f64, [doubled, end]: [f64; 2]) -> Option<(f64, f64)> {
+    let soft = 1.0 / (doubled * rest * doubled * rest);
+    let expected = if expected * change > 0.0 { expected.abs() } else { 0.0 };
+    // The root of at·(1 + soft·at²) = expected.
+    let scale = (3.0 * soft).sqrt();
+    let at = 2.0 / scale * libm::sinh(libm::asinh(1.5 * scale * expected) / 3.0);
+    let slope = 1.0 + 3.0 * soft * at * at;
+    (at < change.abs().min(end * rest)).then(|| ((expected + slope * (change.abs() - at)).copysign(change), slope))
 }
 
 /// The barrier of a tetrahedron that has `left` to gain until it is no longer thin, likewise. Once inverted it is resisted
@@ -280,5 +371,32 @@ impl Inventory {
         self.watched.extend(missed);
         self.watched.sort_unstable();
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tangent_touches_the_curve_where_it_has_the_expected_value() {
+        let (rest, range) = (2.0, [0.1, 0.4]);
+        for sign in [1.0, -1.0] {
+            let (now, _, _) = stiffened(sign * 0.7, rest, range);
+            for at in [0.0, 0.01, 0.2, 0.6] {
+                let (expected, steep, _) = stiffened(sign * at, rest, range);
+                let (push, slope) = tangent(expected, sign * 0.7, rest, range).unwrap();
+                assert!((slope / steep - 1.0).abs() < 1e-12, "{at}");
+                assert!((push - expected - slope * sign * (0.7 - at)).abs() < 1e-12 * push.abs(), "{at}");
+                assert!(push.abs() < now.abs() && push * now > 0.0, "the curve grows faster");
+                let opposite = tangent(-expected, sign * 0.7, rest, range).unwrap();
+                assert_eq!(opposite, (sign * 0.7, 1.0), "no resistance is expected on this side");
+            }
+            // No smaller change, and beyond the curved part.
+            let [(larger, _, _), (far, _, _)] = [0.75, 0.9].map(|change| stiffened(sign * change, rest, range));
+            assert_eq!(tangent(larger, sign * 0.7, rest, range), None);
+            assert_eq!(tangent(far, sign * 1.2, rest, range), None);
+        }
+        assert_eq!(tangent(0.0, 0.5, 0.0, range), None, "nothing to resist");
     }
 }

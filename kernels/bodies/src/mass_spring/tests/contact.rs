@@ -111,6 +111,8 @@ fn a_block_dropped_on_the_ground_comes_to_rest_there() {
         (1e7, 1.0, Some(0.0)),
         (5e4, 0.0, None),
         (5e4, 1.0, None),
+        // A corner went round in circles.
+        (5e6, 1.0, None),
         (1e7, 1.0, None),
     ] {
         let body = block_body([4, 4, 4], 0.1, &material(1000.0, stiffness, 2e3 / stiffness));
