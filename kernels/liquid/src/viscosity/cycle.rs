@@ -1,6 +1,7 @@
 //! One multigrid V-cycle: an approximate solution of A·u = b in `f32`.
 
 use crate::fields::{add_scaled, dot, scale_and_add};
+use crate::stencil::Run;
 use crate::transfer::{Place, add_interpolated, restrict};
 
 use super::coarsen::coarsened;
@@ -193,22 +194,25 @@ fn scales(fine: &Level, coarse: &Level) -> FaceFields<f32> {
     let is_extended = |axis, at| {
         coarse.extensions.as_ref().is_some_and(|extensions| extensions.reaches(axis, coarse.images.home(at)))
     };
-    let scale = |cell, axis: usize| {
-        if fine.rows().find(cell).is_none_or(|at| fine.kinds[axis][at] != FaceKind::Free) {
-            return 0.0;
-        }
-        let (mut sum, mut reaches_free) = (0.0, false);
-        Place::Face(axis).each_parent(cell, |parent, weight| {
-            let at = coarse.rows().find(parent);
-            let kind = at.map_or(FaceKind::Air, |at| coarse.kinds[axis][at]);
-            reaches_free |= kind == FaceKind::Free;
-            if kind != FaceKind::Air || at.is_some_and(|at| is_extended(axis, at)) {
-                sum += weight;
+    let ones = vec![1.0; fine.rows().len()];
+    let interpolated = |axis: usize, counts: &dyn Fn(usize) -> bool| {
+        let counted: Vec<f32> = (0..coarse.rows().len()).map(|at| f32::from(counts(at))).collect();
+        let mut shares = vec![0.0; fine.rows().len()];
+        add_interpolated(Place::Face(axis), &fine.stencil, coarse.rows(), &ones, &counted, &mut shares);
+        shares
+    };
+    std::array::from_fn(|axis| {
+        let kinds = &coarse.kinds[axis];
+        let mut scales = interpolated(axis, &|at| kinds[at] == FaceKind::Free);
+        // Shares are multiples of 1/32, so no sum of them is rounded.
+        let counted = interpolated(axis, &|at| kinds[at] != FaceKind::Air || is_extended(axis, at));
+        fine.stencil.update([&mut scales], |runs, first, [scales]| {
+            for at in runs.iter().flat_map(Run::range) {
+                let scale = &mut scales[at - first];
+                let reaches_free = *scale > 0.0 && fine.kinds[axis][at] == FaceKind::Free;
+                *scale = if reaches_free { 1.0 / counted[at] } else { 0.0 };
             }
         });
-        if reaches_free { 1.0 / sum } else { 0.0 }
-    };
-    let active = fine.stencil.active();
-    let scales: FaceFields<f32> = active.tabulate_each(|cell| [0, 1, 2].map(|axis| scale(cell, axis)));
-    scales.map(|scale| fine.rows().resampled(active, &scale, 0.0))
+        scales
+    })
 }

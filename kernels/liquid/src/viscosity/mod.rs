@@ -21,7 +21,7 @@ mod setup;
 #[cfg(test)]
 mod tests;
 
-use crate::fields::{add_scaled, dot, largest};
+use crate::fields::{add_scaled, in_parts, largest, weighted_dot};
 use crate::pressure::{PressureGrid, PressureSolver, PressureWorkspace, face_densities};
 use crate::rows::{Cell, CellRows, Periods};
 use crate::stencil::Stencil;
@@ -222,11 +222,13 @@ impl StokesSolver {
         let level = self.viscous.finest();
         level.apply(u, &mut work.stresses, out);
         self.add_gradient(q, out);
-        for axis in 0..3 {
-            for at in 0..q.len() {
-                let momentum = f64::from(level.mass[axis][at]) * before[axis][at];
-                out[axis][at] = if self.is_free(axis, at) { momentum - out[axis][at] } else { 0.0 };
-            }
+        for (axis, out) in out.iter_mut().enumerate() {
+            in_parts(out, |first, part| {
+                for (at, out) in (first..).zip(part) {
+                    let momentum = f64::from(level.mass[axis][at]) * before[axis][at];
+                    *out = if self.is_free(axis, at) { momentum - *out } else { 0.0 };
+                }
+            });
         }
     }
 
@@ -235,18 +237,19 @@ impl StokesSolver {
         let flow = largest(&residual.q);
         if flow > 0.0 {
             self.pressure.precondition(&mut work.pressure, &residual.q, flow, &mut z.q);
-            for ((z, residual), resistance) in z.q.iter_mut().zip(&residual.q).zip(&self.resistance) {
-                *z += resistance * residual;
-            }
+            in_parts(&mut z.q, |first, part| {
+                let of_part = residual.q[first..].iter().zip(&self.resistance[first..]);
+                part.iter_mut().zip(of_part).for_each(|(z, (residual, resistance))| *z += resistance * residual);
+            });
         } else {
             z.q.fill(0.0);
         }
         work.force.iter_mut().for_each(|force| force.fill(0.0));
         self.add_gradient(&mut z.q, &mut work.force);
-        for axis in 0..3 {
-            for (force, residual) in work.force[axis].iter_mut().zip(&residual.u[axis]) {
-                *force = residual - *force;
-            }
+        for (force, residual) in work.force.iter_mut().zip(&residual.u) {
+            in_parts(force, |first, part| {
+                part.iter_mut().zip(&residual[first..]).for_each(|(force, residual)| *force = residual - *force);
+            });
         }
         self.precondition_velocity(work, &mut z.u);
     }
@@ -254,8 +257,8 @@ impl StokesSolver {
     /// `z` ≈ the viscous velocity for the force in `work`.
     fn precondition_velocity(&self, work: &mut Work, z: &mut FaceFields<f64>) {
         let level = self.viscous.finest();
-        for axis in 0..3 {
-            work.bending[axis].copy_from_slice(&work.force[axis]);
+        for (bending, force) in work.bending.iter_mut().zip(&work.force) {
+            in_parts(bending, |first, part| part.copy_from_slice(&force[first..][..part.len()]));
         }
         self.rigid.remove(level, &mut work.bending);
         let force = work.bending.iter().map(|force| largest(force)).fold(0.0, f64::max);
@@ -320,10 +323,10 @@ impl StokesSolver {
         let inverse = &self.viscous.finest().inverse_diagonal;
         let mut sum = 0.0;
         for axis in 0..3 {
-            sum += weighted(&a.u[axis], &b.u[axis], |at| f64::from(inverse[axis][at]));
+            sum += weighted_dot(&a.u[axis], &b.u[axis], |at| f64::from(inverse[axis][at]));
         }
         let of_pressure = self.pressure.inverse_diagonal();
-        sum + weighted(&a.q, &b.q, |at| f64::from(of_pressure[at]) + self.resistance[at])
+        sum + weighted_dot(&a.q, &b.q, |at| f64::from(of_pressure[at]) + self.resistance[at])
     }
 }
 
@@ -395,9 +398,3 @@ fn resistance(level: &Level, flow: &Flow, pressure: &PressureSolver) -> Vec<f64>
 
 /// Viscosities around a face ÷ its mass, below which they are rounding.
 const LEAST_VISCOUS: f64 = 1e-6;
-
-/// Σ weight · a · b.
-fn weighted(a: &[f64], b: &[f64], weight: impl Fn(usize) -> f64 + Sync) -> f64 {
-    let weighted: Vec<f64> = a.iter().enumerate().map(|(at, a)| a * weight(at)).collect();
-    dot(&weighted, b)
-}
