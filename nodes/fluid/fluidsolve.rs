@@ -22,6 +22,7 @@ use run::Run;
 
 mod carried;
 mod domain;
+mod drop_bins;
 mod explained;
 mod measured;
 mod openings;
