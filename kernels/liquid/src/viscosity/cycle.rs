@@ -1,6 +1,6 @@
 //! One multigrid V-cycle: an approximate solution of A·u = b in `f32`.
 
-use crate::fields::{add_scaled, dot, scale_and_add};
+use crate::fields::{add_scaled, divide_into, dot, in_parts, scale_and_add};
 use crate::stencil::Run;
 use crate::transfer::{Place, add_interpolated, restrict};
 
@@ -20,6 +20,8 @@ pub(super) struct Multigrid {
     levels: Vec<Level>,
     /// Of each level but the coarsest, towards the next.
     scales: Vec<FaceFields<f32>>,
+    /// Whether there is one grid alone, which smoothing solves.
+    is_light: bool,
 }
 
 /// The fields of a level during a cycle.
@@ -34,9 +36,10 @@ struct Scratch {
 pub(super) struct Workspace(Vec<Scratch>);
 
 impl Multigrid {
-    pub(super) fn new(finest: Level) -> Self {
+    /// `is_light`: mass outweighs viscosity everywhere, so that no error is too smooth for the smoother.
+    pub(super) fn new(finest: Level, is_light: bool) -> Self {
         let mut levels = vec![finest];
-        loop {
+        while !is_light {
             let fine = &levels[levels.len() - 1];
             let cells = fine.stencil.active().len();
             if cells <= COARSEST {
@@ -50,7 +53,7 @@ impl Multigrid {
             levels.push(coarse);
         }
         let scales = levels.windows(2).map(|pair| scales(&pair[0], &pair[1])).collect();
-        Self { levels, scales }
+        Self { levels, scales, is_light }
     }
 
     /// The grids, the finest first.
@@ -81,18 +84,15 @@ impl Multigrid {
         largest: f64,
         out: &mut FaceFields<f64>,
     ) {
-        let finest = &mut workspace.0[0];
-        for axis in 0..3 {
+        for (to, from) in workspace.0[0].b.iter_mut().zip(b) {
             // Largest entry 1: neither overflow nor denormals, whatever the unit.
-            for (to, from) in finest.b[axis].iter_mut().zip(&b[axis]) {
-                *to = (from / largest) as f32;
-            }
+            divide_into(to, from, largest);
         }
         self.cycle(0, &mut workspace.0);
-        for axis in 0..3 {
-            for (to, from) in out[axis].iter_mut().zip(&workspace.0[0].smoothing.u[axis]) {
-                *to = f64::from(*from) * largest;
-            }
+        for (to, from) in out.iter_mut().zip(&workspace.0[0].smoothing.u) {
+            in_parts(to, |first, part| {
+                part.iter_mut().zip(&from[first..]).for_each(|(to, from)| *to = f64::from(*from) * largest);
+            });
         }
     }
 
@@ -101,6 +101,10 @@ impl Multigrid {
         let (fine, coarser) = scratch.split_at_mut(1);
         let Scratch { smoothing, b } = &mut fine[0];
         let Some(scale) = self.scales.get(number) else {
+            if self.is_light {
+                level.smooth(true, b, smoothing);
+                return level.smooth(false, b, smoothing);
+            }
             return solve_coarsest(level, b, &mut smoothing.u);
         };
         let coarse = &self.levels[number + 1];

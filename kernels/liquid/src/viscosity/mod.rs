@@ -10,6 +10,8 @@
 //! complement one cycle of the pressure equation plus the resistance of viscosity (Cahouet and Chabard 1988). Rigid motions of
 //! every component that is free to move are solved for exactly in each iteration; without that, nearly rigid liquid
 //! takes five times the iterations and loses its spin.
+//! Where a liquid's momentum outweighs its viscosity in every cell, smoothing alone does for both, and neither coarser grids nor
+//! rigid motions are set up.
 
 mod alone;
 mod coarsen;
@@ -96,6 +98,10 @@ struct Unknowns {
     q: Vec<f64>,
 }
 
+/// The largest ν̂ ÷ density with which a velocity's own momentum is half of the matrix's diagonal in the liquid: smoothing
+/// then reaches every error, rigid motions too.
+const LIGHT: f32 = 0.125;
+
 /// Directions kept for orthogonality, at most; the oldest is dropped first. Ten are not enough where the viscosity jumps
 /// by 1e8.
 const KEPT: usize = 40;
@@ -119,9 +125,10 @@ impl StokesSolver {
         let pressure_grid = PressureGrid { rows, level_set, weights: [x, y, z], periods };
         let pressure = PressureSolver::new(&pressure_grid);
         let (level, flow) = setup::set_up(grid, &pressure);
-        let rigid = RigidMotions::find(&level);
+        let is_light = largest_viscosity(grid) <= LIGHT;
+        let rigid = if is_light { RigidMotions::default() } else { RigidMotions::find(&level) };
         let resistance = resistance(&level, &flow, &pressure);
-        Self { pressure, viscous: Multigrid::new(level), rigid, flow, resistance }
+        Self { pressure, viscous: Multigrid::new(level, is_light), rigid, flow, resistance }
     }
 
     /// The cells that fields of this solver are stored for.
@@ -361,6 +368,12 @@ impl Unknowns {
         }
         add_scaled(&mut self.q, share, &other.q);
     }
+}
+
+/// The largest ν̂ ÷ density of liquid.
+fn largest_viscosity(grid: &StokesGrid<'_>) -> f32 {
+    let liquid = grid.viscosity.iter().zip(grid.density).zip(grid.level_set).filter(|(_, phi)| **phi < 0.0);
+    liquid.fold(0.0, |most, ((viscosity, density), _)| most.max(viscosity / density))
 }
 
 /// What a pressure has to be in a liquid cell, ÷ its net outflow, where viscosity alone resists: the inverse of the
