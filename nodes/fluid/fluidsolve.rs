@@ -22,6 +22,7 @@ use run::Run;
 
 mod carried;
 mod domain;
+mod drop_bins;
 mod explained;
 mod measured;
 mod openings;
@@ -249,7 +250,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "FluidSolve",
-    5,
+    6,
     "Simulates a liquid, from water to honey to nearly rigid. It falls, splashes, sloshes, piles up and creeps. `viscosity` has \
      the same effect at any cell size and time step.",
     Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),

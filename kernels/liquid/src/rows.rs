@@ -55,6 +55,9 @@ const MOST_BITS: i64 = 512;
 /// Cells that one thread tabulates, about.
 const TABULATED: usize = 4096;
 
+/// Cells that one thread copies, about.
+const COPIED: usize = 32_768;
+
 /// A set of cells. Spans of a row ascend and do not touch. The first and the last row along y and along z have cells.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CellRows {
@@ -184,8 +187,13 @@ impl CellRows {
 
     /// The rows that hold cells, with y and z, in the order of fields.
     pub fn rows(&self) -> impl Iterator<Item = ([i32; 2], &[RowSpan])> {
-        let [ny, nz] = self.size;
-        let rows = (0..nz).flat_map(move |k| (0..ny).map(move |j| [self.low[0] + j, self.low[1] + k]));
+        self.rows_of(0..self.size[1])
+    }
+
+    /// Those of some layers along z, counted from the first.
+    fn rows_of(&self, layers: Range<i32>) -> impl Iterator<Item = ([i32; 2], &[RowSpan])> {
+        let ny = self.size[0];
+        let rows = layers.flat_map(move |k| (0..ny).map(move |j| [self.low[0] + j, self.low[1] + k]));
         rows.map(|[y, z]| ([y, z], self.row(y, z))).filter(|(_, spans)| !spans.is_empty())
     }
 
@@ -314,8 +322,13 @@ impl CellRows {
 
     /// Calls `copy` with where each stretch of cells that both sets hold lies in a field on these rows, in one on
     /// `other`, and its length.
-    pub fn for_each_shared(&self, other: &Self, mut copy: impl FnMut(usize, usize, usize)) {
-        for ([y, z], spans) in self.rows() {
+    pub fn for_each_shared(&self, other: &Self, copy: impl FnMut(usize, usize, usize)) {
+        self.for_each_shared_in(0..self.size[1], other, copy);
+    }
+
+    /// The same for the rows of some layers along z, counted from the first.
+    fn for_each_shared_in(&self, layers: Range<i32>, other: &Self, mut copy: impl FnMut(usize, usize, usize)) {
+        for ([y, z], spans) in self.rows_of(layers) {
             let others = other.row(y, z);
             let mut next = 0;
             for span in spans {
@@ -369,11 +382,32 @@ impl CellRows {
         out
     }
 
-    /// A field on these rows with the values of `field` on `from`, and `outside` where `from` has no cell.
-    pub fn resampled<T: Copy>(&self, from: &Self, field: &[T], outside: T) -> Vec<T> {
+    /// A field on these rows with the values of `field` on `from`, and `outside` where `from` has no cell. In parallel.
+    pub fn resampled<T: Copy + Send + Sync>(&self, from: &Self, field: &[T], outside: T) -> Vec<T> {
         let mut out = vec![outside; self.len()];
-        self.for_each_shared(from, |at, theirs, len| out[at..at + len].copy_from_slice(&field[theirs..theirs + len]));
+        let mut rest = &mut out[..];
+        let mut part = |layers: Range<i32>| {
+            let first = self.start_of(layers.start);
+            let (part, after) = take(&mut rest).split_at_mut(self.start_of(layers.end) - first);
+            rest = after;
+            (layers, first, part)
+        };
+        let layers = self.size[1];
+        let each = (layers as usize * COPIED / self.len().max(1)).clamp(1, layers.max(1) as usize) as i32;
+        let parts: Vec<_> = (0..layers).step_by(each as usize).map(|z| part(z..min(z + each, layers))).collect();
+        parallel::for_each(parts, |_, (layers, first, part)| {
+            self.for_each_shared_in(layers, from, |at, theirs, len| {
+                part[at - first..at - first + len].copy_from_slice(&field[theirs..theirs + len]);
+            });
+        });
         out
+    }
+
+    /// Where the value of the first cell from a layer along z on is, layers counted from the first.
+    fn start_of(&self, layer: i32) -> usize {
+        let row = layer as usize * self.size[0] as usize;
+        let span = self.first.get(row).and_then(|span| self.spans.get(*span as usize));
+        span.map_or(self.cells, |span| span.base as usize)
     }
 }
 
@@ -401,26 +435,30 @@ fn parts<'a, T, const N: usize>(
 pub struct Finder<'a> {
     rows: &'a CellRows,
     /// For rows with the same y and z modulo 4, the row that was looked at last, and its span.
-    last: [([i32; 2], RowSpan); 16],
+    last: [Remembered; 16],
 }
+
+/// A row, y and z, and a span of it.
+type Remembered = std::cell::Cell<([i32; 2], RowSpan)>;
 
 impl<'a> Finder<'a> {
     /// Finds cells of these rows.
     pub fn new(rows: &'a CellRows) -> Self {
-        Self { rows, last: [([0; 2], RowSpan { start: 0, end: 0, base: 0 }); 16] }
+        let none = ([0; 2], RowSpan { start: 0, end: 0, base: 0 });
+        Self { rows, last: std::array::from_fn(|_| Remembered::new(none)) }
     }
 
     /// Where the value of a cell is; `None` where it is not stored.
     #[inline(always)]
-    pub fn find(&mut self, [x, y, z]: Cell) -> Option<usize> {
-        let (row, span) = &self.last[(y & 3 | (z & 3) << 2) as usize];
-        if *row == [y, z] && span.contains(x) { Some(span.at(x)) } else { self.find_span([x, y, z]) }
+    pub fn find(&self, [x, y, z]: Cell) -> Option<usize> {
+        let (row, span) = self.last[(y & 3 | (z & 3) << 2) as usize].get();
+        if row == [y, z] && span.contains(x) { Some(span.at(x)) } else { self.find_span([x, y, z]) }
     }
 
     #[inline(never)]
-    fn find_span(&mut self, [x, y, z]: Cell) -> Option<usize> {
+    fn find_span(&self, [x, y, z]: Cell) -> Option<usize> {
         let span = self.rows.span_of([x, y, z])?;
-        self.last[(y & 3 | (z & 3) << 2) as usize] = ([y, z], *span);
+        self.last[(y & 3 | (z & 3) << 2) as usize].set(([y, z], *span));
         Some(span.at(x))
     }
 }

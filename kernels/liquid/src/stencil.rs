@@ -89,8 +89,17 @@ impl Stencil {
     /// Calls `f` with the runs of each chunk, where the first of its values is in the fields, and its part of each field
     /// of `out`; in parallel.
     pub fn update<T: Send, const N: usize>(&self, out: [&mut [T]; N], f: impl Fn(&[Run], usize, [&mut [T]; N]) + Sync) {
+        self.update_and_fold(out, f);
+    }
+
+    /// The same; what `f` makes of each chunk, in the order of fields.
+    pub fn update_and_fold<T: Send, R: Send, const N: usize>(
+        &self,
+        out: [&mut [T]; N],
+        f: impl Fn(&[Run], usize, [&mut [T]; N]) -> R + Sync,
+    ) -> Vec<R> {
         if let [chunk] = &self.chunks[..] {
-            return f(&self.runs[chunk.runs.clone()], 0, out);
+            return vec![f(&self.runs[chunk.runs.clone()], 0, out)];
         }
         let mut rest = out;
         let parts: Vec<_> = self
@@ -105,7 +114,7 @@ impl Stencil {
                 (chunk, part)
             })
             .collect();
-        parallel::for_each(parts, |_, (chunk, part)| f(&self.runs[chunk.runs.clone()], chunk.values.start, part));
+        parallel::map(parts, |_, (chunk, part)| f(&self.runs[chunk.runs.clone()], chunk.values.start, part))
     }
 
     /// What `f` makes of the runs of each chunk, in the order of fields.

@@ -7,7 +7,7 @@ use std::cmp::{max, min};
 
 use numerics::simd::{Path, kernel};
 
-use crate::rows::{Cell, CellRows, RowSpan};
+use crate::rows::{CellRows, RowSpan};
 use crate::stencil::{Run, Stencil};
 
 /// Where the values of a field are in their cells.
@@ -38,21 +38,6 @@ impl Place {
     /// The four fine numbers that have a coarse one among their parents, from 2n − 1 on, with its weights.
     fn children(self, axis: usize) -> [f32; 4] {
         if self.is_on_faces(axis) { [0.5, 1.0, 0.5, 0.0] } else { [0.25, 0.75, 0.75, 0.25] }
-    }
-
-    /// The coarse cells that a fine value is interpolated from, with their weights.
-    pub(crate) fn each_parent(self, cell: Cell, mut f: impl FnMut(Cell, f32)) {
-        let [xs, ys, zs] = [0, 1, 2].map(|axis| self.parents(axis, cell[axis]));
-        for (z, weight_z) in zs {
-            for (y, weight_y) in ys {
-                for (x, weight_x) in xs {
-                    let weight = weight_x * weight_y * weight_z;
-                    if weight > 0.0 {
-                        f([x, y, z], weight);
-                    }
-                }
-            }
-        }
     }
 }
 
@@ -201,6 +186,22 @@ fn add_row(row: &mut &[RowSpan], field: &[f32], from: i32, weight: f32, line: &m
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rows::Cell;
+
+    /// Calls `f` with the coarse cells that a fine value is interpolated from, and their weights.
+    fn each_parent(place: Place, cell: Cell, mut f: impl FnMut(Cell, f32)) {
+        let [xs, ys, zs] = [0, 1, 2].map(|axis| place.parents(axis, cell[axis]));
+        for (z, weight_z) in zs {
+            for (y, weight_y) in ys {
+                for (x, weight_x) in xs {
+                    let weight = weight_x * weight_y * weight_z;
+                    if weight > 0.0 {
+                        f([x, y, z], weight);
+                    }
+                }
+            }
+        }
+    }
 
     /// Values that grow linearly are interpolated exactly, and restriction is the transpose of interpolation.
     #[test]
@@ -221,7 +222,7 @@ mod tests {
                 let value = interpolated[fine.rows().find(cell).unwrap()];
                 assert!((value - linear(position(cell, 1.0))).abs() < 1e-4, "{place:?} {cell:?}");
                 let mut sum = 0.0;
-                place.each_parent(cell, |parent, weight| sum += weight * linear(position(parent, 2.0)));
+                each_parent(place, cell, |parent, weight| sum += weight * linear(position(parent, 2.0)));
                 assert!((value - sum).abs() < 1e-4, "{place:?} {cell:?}");
             }
             // Small whole numbers: sums are exact.

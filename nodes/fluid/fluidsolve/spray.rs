@@ -9,6 +9,7 @@ use liquid::step::{Domain, LiquidBall, Wall};
 use numerics::vector::{add, length, lerp, scale, sub};
 use serde::{Deserialize, Serialize};
 
+use super::drop_bins::DropBins;
 use super::shapes::Colliders;
 
 /// Parts of a cell in which a drop looks for colliders on its way, and the most of them in a frame.
@@ -163,15 +164,16 @@ pub(super) fn gathered(spray: &mut Vec<SprayDrop>, air: &Air<'_>) -> Vec<(Liquid
     let enough = SHOWN * air.cell * air.cell * air.cell;
     let mut largest: Vec<usize> = (0..spray.len()).collect();
     largest.sort_by(|a, b| spray[*b].volume.total_cmp(&spray[*a].volume));
+    let bins = DropBins::new(spray);
     let (mut is_taken, mut balls) = (vec![false; spray.len()], Vec::new());
     for first in largest {
         if is_taken[first] {
             continue;
         }
         let reach = TOGETHER.max(spray[first].radius(air.cell));
-        let is_same = |n: usize| !is_taken[n] && spray[n].phase == spray[first].phase;
-        let near = |n: &usize| is_same(*n) && length(sub(spray[*n].place, spray[first].place)) <= reach;
-        let own: Vec<usize> = (0..spray.len()).filter(near).collect();
+        let is_near = |n: &usize| !is_taken[*n] && length(sub(spray[*n].place, spray[first].place)) <= reach;
+        let mut own = bins.near(&spray[first], reach, enough);
+        own.retain(is_near);
         let together = sum(own.iter().map(|n| &spray[*n]), &spray[first]);
         if together.volume < enough {
             continue;
@@ -199,6 +201,7 @@ fn sum<'a>(drops: impl Iterator<Item = &'a SprayDrop> + Clone, first: &SprayDrop
 mod tests {
     use engine::prelude::*;
     use liquid::step::Domain;
+    use numerics::random::Key;
 
     use super::*;
     use crate::shared::volume::Lattice;
@@ -257,6 +260,34 @@ mod tests {
         let radius = f64::from(ball.radius);
         assert!((4.0 / 3.0 * PI * radius * radius * radius - 9.0).abs() < 1e-4);
         assert!(gathered(&mut spray, &air).is_empty() && spray.len() == 1);
+    }
+
+    #[test]
+    fn which_drops_are_near_takes_no_look_at_all_of_them() {
+        let random = |n: u64, k: u64| Key::new(5).of(n).of(k).f32();
+        let any = |n: u64| {
+            let place = [0, 1, 2].map(|k| 24.0 * random(n, k) - 2.0);
+            // A few are larger than the distance up to which drops gather.
+            let volume = f64::from(random(n, 3).powi(40) * 60.0);
+            SprayDrop { volume, phase: (random(n, 4) * 2.0) as u32, ..drop(place, [0.0; 3]) }
+        };
+        let spray: Vec<SprayDrop> = (0..3000).map(any).collect();
+        let bins = DropBins::new(&spray);
+        let mut found = [0; 2];
+        for first in &spray {
+            let reach = TOGETHER.max(radius(first.volume));
+            let near = |n: &usize| spray[*n].phase == first.phase && length(sub(spray[*n].place, first.place)) <= reach;
+            let all: Vec<usize> = (0..spray.len()).filter(near).collect();
+            let mut binned = bins.near(first, reach, 0.0);
+            assert!(binned.len() < spray.len() / 10 || reach > TOGETHER);
+            binned.retain(near);
+            assert_eq!(binned, all);
+            let volume: f64 = all.iter().map(|n| spray[*n].volume).sum();
+            let is_enough = !bins.near(first, reach, SHOWN).is_empty();
+            assert!(is_enough || volume < SHOWN);
+            found[usize::from(is_enough)] += 1;
+        }
+        assert!(found.iter().all(|n| *n > 300), "{found:?}");
     }
 
     #[test]

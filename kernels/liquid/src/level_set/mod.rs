@@ -257,6 +257,9 @@ impl LevelSet {
         for ([y, z], spans) in rows.rows() {
             let whole = within(y, 1) != y || within(z, 2) != z;
             for span in spans {
+                if !whole && low[0] <= span.start && span.end <= high[0] {
+                    continue;
+                }
                 let ends = [span.start..span.start + 1, span.end - 1..span.end];
                 let all = [span.start..span.end, 0..0];
                 for x in if whole { all } else { ends }.into_iter().flatten() {

@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use crate::sets::Sets;
-use crate::stencil::Stencil;
+use crate::stencil::Run;
 
 use super::level::{CellKind, Level};
 
@@ -19,19 +19,10 @@ impl Closed {
         let mut meets_air = vec![false; pieces.len()];
         let mut number = vec![u32::MAX; level.rows().len()];
         pieces.iter().enumerate().for_each(|(n, piece)| number[piece.clone()].fill(n as u32));
-        for_each_face(&level.stencil, |axis, below, above| {
-            let [below, above] = [below, above].map(|at| level.images.home(at));
-            if level.weights[axis][above] > 0.0 {
-                match (number[below], number[above]) {
-                    (u32::MAX, n) | (n, u32::MAX) if n != u32::MAX => {
-                        let outside = if number[below] == u32::MAX { below } else { above };
-                        meets_air[n as usize] |= level.kinds[outside] == CellKind::Air;
-                    }
-                    (a, b) if a != b => sets.join(a, b),
-                    _ => {}
-                }
-            }
-        });
+        for contacts in level.stencil.fold(|runs| Contacts::of(level, &number, runs)) {
+            contacts.with_air.iter().for_each(|piece| meets_air[*piece as usize] = true);
+            contacts.joined.iter().flatten().for_each(|[a, b]| sets.join(*a, *b));
+        }
         let mut open = vec![false; pieces.len()];
         for n in 0..pieces.len() {
             open[sets.first(n as u32) as usize] |= meets_air[n];
@@ -69,30 +60,77 @@ impl Closed {
 
 /// Liquid cells next to each other along x with open faces between them.
 fn pieces(level: &Level) -> Vec<Range<usize>> {
-    let mut out: Vec<Range<usize>> = Vec::new();
-    for run in level.stencil.runs() {
-        for at in run.range() {
+    let is_open = |at: usize| level.weights[0][at] > 0.0;
+    let of_chunks = level.stencil.fold(|runs| {
+        let mut out: Vec<Range<usize>> = Vec::new();
+        for at in runs.iter().flat_map(Run::range) {
             match out.last_mut() {
-                Some(last) if last.end == at && level.weights[0][at] > 0.0 => last.end += 1,
+                Some(last) if last.end == at && is_open(at) => last.end += 1,
                 _ => out.push(at..at + 1),
             }
         }
+        out
+    });
+    let mut all: Vec<Range<usize>> = Vec::new();
+    for mut pieces in of_chunks {
+        // A piece may go on from one chunk to the next.
+        match (all.last_mut(), pieces.first_mut()) {
+            (Some(last), Some(first)) if last.end == first.start && is_open(first.start) => {
+                first.start = last.start;
+                all.pop();
+            }
+            _ => {}
+        }
+        all.extend(pieces);
     }
-    out
+    all
 }
 
-/// Calls `f` with the axis of each face of an active cell and the cells below and above it; faces between two active
-/// cells come twice.
-fn for_each_face(stencil: &Stencil, mut f: impl FnMut(usize, usize, usize)) {
-    for run in stencil.runs() {
-        for n in 0..run.len as usize {
-            let at = run.at as usize + n;
-            let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
-            let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
-            for axis in 0..3 {
-                f(axis, below[axis], at);
-                f(axis, at, above[axis]);
+/// What the pieces of a chunk have open faces to.
+#[derive(Default)]
+struct Contacts {
+    with_air: Vec<u32>,
+    /// Along each axis.
+    joined: [Vec<[u32; 2]>; 3],
+}
+
+impl Contacts {
+    /// `number`: the piece of each cell, `u32::MAX` where it is not liquid.
+    fn of(level: &Level, number: &[u32], runs: &[Run]) -> Self {
+        let mut contacts = Self::default();
+        for run in runs {
+            for n in 0..run.len as usize {
+                let at = run.at as usize + n;
+                let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
+                let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
+                for axis in 0..3 {
+                    contacts.add(level, number, axis, [at, below[axis]], at);
+                    // The face to a liquid cell above is that one's, too.
+                    if number[above[axis]] == u32::MAX {
+                        contacts.add(level, number, axis, [at, above[axis]], above[axis]);
+                    }
+                }
             }
+        }
+        contacts
+    }
+
+    /// Of a liquid cell and one beside it, with the low face of `face` between them.
+    #[inline(always)]
+    fn add(&mut self, level: &Level, number: &[u32], axis: usize, [at, beside]: [usize; 2], face: usize) {
+        let [beside, face] = [beside, face].map(|at| level.images.home(at));
+        let [own, other] = [at, beside].map(|at| number[at]);
+        if own == other || level.weights[axis][face] <= 0.0 {
+            return;
+        }
+        if other != u32::MAX {
+            // Pieces lie beside each other over many cells.
+            let joined = &mut self.joined[axis];
+            if joined.last() != Some(&[own, other]) {
+                joined.push([own, other]);
+            }
+        } else if level.kinds[beside] == CellKind::Air && self.with_air.last() != Some(&own) {
+            self.with_air.push(own);
         }
     }
 }

@@ -36,7 +36,7 @@ pub(super) fn coarsened(fine: &Level, distances: &SurfaceDistances) -> Option<(L
     Some((level, coarse_distances))
 }
 
-fn kind(fine: &Level, finder: &mut Finder<'_>, coarse: Cell) -> CellKind {
+fn kind(fine: &Level, finder: &Finder<'_>, coarse: Cell) -> CellKind {
     let (mut liquid, mut air) = (0, 0);
     for child in 0..8 {
         let offset = [child & 1, child >> 1 & 1, child >> 2];
@@ -56,7 +56,7 @@ fn kind(fine: &Level, finder: &mut Finder<'_>, coarse: Cell) -> CellKind {
 
 /// Four children's faces, with four times the area over twice the distance. Where none is stored the face is far from
 /// any liquid, and open.
-fn weight(weights: &[f32], finder: &mut Finder<'_>, coarse: Cell, axis: usize) -> f32 {
+fn weight(weights: &[f32], finder: &Finder<'_>, coarse: Cell, axis: usize) -> f32 {
     let (mut sum, mut count) = (0.0, 0.0);
     for column in columns(coarse, axis) {
         if let Some(at) = finder.find(column) {
@@ -89,7 +89,7 @@ fn coarse_distances(
         [0, 1, 2].map(|axis| {
             let mut below = cell;
             below[axis] -= 1;
-            let mut distance = |towards: i32| distance(fine, finder, &distances[axis], cell, axis, towards);
+            let distance = |towards: i32| distance(fine, finder, &distances[axis], cell, axis, towards);
             match (coarse.find(below).map(|at| kinds[at]), kinds[at]) {
                 (Some(CellKind::Liquid), CellKind::Air) => distance(1),
                 (Some(CellKind::Air), CellKind::Liquid) => distance(-1),
@@ -101,12 +101,12 @@ fn coarse_distances(
 
 /// The distance of the surface from the centre of the liquid cell beside the low face of `coarse`, in coarse cells; the
 /// liquid is below the face where `towards` is 1, above it where −1.
-fn distance(fine: &Level, finder: &mut Finder<'_>, distances: &[f32], coarse: Cell, axis: usize, towards: i32) -> f32 {
+fn distance(fine: &Level, finder: &Finder<'_>, distances: &[f32], coarse: Cell, axis: usize, towards: i32) -> f32 {
     let (mut sum, mut count) = (0.0, 0.0);
     for column in columns(coarse, axis) {
         // Four cells from within the liquid outwards, the face between the second and the third.
         let first = if towards > 0 { column[axis] - 2 } else { column[axis] + 1 };
-        let mut child = |n: usize| {
+        let child = |n: usize| {
             let mut cell = column;
             cell[axis] = first + towards * n as i32;
             finder.find(cell)

@@ -1,6 +1,7 @@
 //! One multigrid V-cycle: an approximate solution of A·q = b, symmetric in b, in `f32`.
 
-use crate::rows::Finder;
+use crate::fields::{divide_into, multiply_into};
+use crate::stencil::Run;
 use crate::transfer::{Place, add_interpolated, restrict};
 
 use super::coarsen::coarsened;
@@ -36,21 +37,24 @@ struct Scratch {
 pub(super) struct Workspace(Vec<Scratch>);
 
 impl Multigrid {
-    pub(super) fn new(finest: Level, distances: SurfaceDistances) -> Self {
-        let (mut levels, mut distances) = (vec![finest], distances);
+    /// `distances`: of the surface, on the finest grid.
+    pub(super) fn new(finest: Level, distances: &SurfaceDistances) -> Self {
+        let (mut levels, mut coarser) = (vec![finest], None);
         loop {
             let fine = &levels[levels.len() - 1];
             let cells = fine.stencil.active().len();
             if cells <= DIRECT {
                 break;
             }
-            let Some((coarse, coarse_distances)) = coarsened(fine, &distances) else { break };
+            let Some((coarse, coarse_distances)) = coarsened(fine, coarser.as_ref().unwrap_or(distances)) else {
+                break;
+            };
             // Scattered drops, or a grid that is one cell wide, do not get coarser.
             if coarse.stencil.active().len() * 10 > cells * 9 {
                 break;
             }
             levels.push(coarse);
-            distances = coarse_distances;
+            coarser = Some(coarse_distances);
         }
         let scales = levels.windows(2).map(|pair| scales(&pair[0], &pair[1])).collect();
         let coarsest = &levels[levels.len() - 1];
@@ -70,17 +74,12 @@ impl Multigrid {
         Workspace(self.levels.iter().map(scratch).collect())
     }
 
-    /// `out` ≈ A⁻¹·`b`. `b` is 0 where the cell is not liquid.
-    pub(super) fn solve(&self, workspace: &mut Workspace, b: &[f64], largest: f64, out: &mut [f64]) {
+    /// `out` ≈ A⁻¹·`b`, whose largest entry is `largest`; Σ b·out. `b` is 0 where the cell is not liquid.
+    pub(super) fn solve(&self, workspace: &mut Workspace, b: &[f64], largest: f64, out: &mut [f64]) -> f64 {
         // Largest entry 1: neither overflow nor denormals, whatever the unit.
-        let finest = &mut workspace.0[0];
-        for (to, from) in finest.b.iter_mut().zip(b) {
-            *to = (from / largest) as f32;
-        }
+        divide_into(&mut workspace.0[0].b, b, largest);
         self.cycle(0, &mut workspace.0);
-        for (to, from) in out.iter_mut().zip(&workspace.0[0].q) {
-            *to = f64::from(*from) * largest;
-        }
+        multiply_into(out, &workspace.0[0].q, largest, b)
     }
 
     fn cycle(&self, number: usize, scratch: &mut [Scratch]) {
@@ -109,18 +108,19 @@ impl Multigrid {
 /// What the weights of interpolation are multiplied by in each fine cell; 0 where it is not liquid. Solid cells are left
 /// out, so that walls do not pull the pressure down; air counts, with pressure 0.
 fn scales(fine: &Level, coarse: &Level) -> Vec<f32> {
-    let scale = |finder: &mut Finder<'_>, cell| {
-        let (mut sum, mut reaches_liquid) = (0.0, false);
-        Place::Centre.each_parent(cell, |parent, weight| {
-            let kind = finder.find(parent).map_or(CellKind::Air, |at| coarse.kinds[at]);
-            reaches_liquid |= kind == CellKind::Liquid;
-            if kind != CellKind::Solid {
-                sum += weight;
-            }
-        });
-        if reaches_liquid { 1.0 / sum } else { 0.0 }
+    let interpolated = |kind: CellKind| {
+        let is_kind: Vec<f32> = coarse.kinds.iter().map(|other| f32::from(*other == kind)).collect();
+        let (mut shares, ones) = (vec![0.0; fine.rows().len()], vec![1.0; fine.rows().len()]);
+        add_interpolated(Place::Centre, &fine.stencil, coarse.rows(), &ones, &is_kind, &mut shares);
+        shares
     };
-    let liquid = fine.stencil.active();
-    let [scales] = liquid.tabulate_with(|| Finder::new(coarse.rows()), |finder, cell, _| [scale(finder, cell)]);
-    fine.rows().resampled(liquid, &scales, 0.0)
+    // Shares are multiples of 1/64, so no sum of them is rounded.
+    let (mut scales, solid) = (interpolated(CellKind::Liquid), interpolated(CellKind::Solid));
+    fine.stencil.update([&mut scales], |runs, first, [scales]| {
+        for at in runs.iter().flat_map(Run::range) {
+            let scale = &mut scales[at - first];
+            *scale = if *scale > 0.0 { 1.0 / (1.0 - solid[at]) } else { 0.0 };
+        }
+    });
+    scales
 }

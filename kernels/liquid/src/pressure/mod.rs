@@ -17,9 +17,9 @@ mod tests;
 
 use std::ops::Range;
 
-use crate::fields::{add_scaled, dot, largest, scale_and_add};
+use crate::fields::{add_scaled, advance, dot, largest, scale_and_add};
 use crate::rows::{Cell, CellRows, Finder, Images, Periods};
-use crate::stencil::{Run, Stencil};
+use crate::stencil::Stencil;
 use crate::velocity::FaceFields;
 
 use closed::Closed;
@@ -100,7 +100,7 @@ impl PressureSolver {
         let distances = surface_distances(&stencil, &level_set, &images);
         let finest = Level::new(stencil, kinds, weights, &distances, images);
         let closed = Closed::find(&finest);
-        Self { multigrid: Multigrid::new(finest, distances.clone()), distances, closed }
+        Self { multigrid: Multigrid::new(finest, &distances), distances, closed }
     }
 
     /// The cells that fields of this solver are stored for.
@@ -144,9 +144,9 @@ impl PressureSolver {
         let (mut direction, mut better) = (vec![0.0; q.len()], vec![0.0; q.len()]);
         let mut energy_before = 0.0;
         while solved.flow > stop.flow && solved.iterations < stop.iterations {
-            self.multigrid.solve(&mut workspace, residual, solved.flow, &mut better);
-            self.closed.subtract_means(&mut better);
-            let energy = dot(residual, &better);
+            let energy = self.multigrid.solve(&mut workspace, residual, solved.flow, &mut better);
+            let is_shifted = self.closed.subtract_means(&mut better) != 0.0;
+            let energy = if is_shifted { dot(residual, &better) } else { energy };
             let share = if solved.iterations == 0 { 0.0 } else { energy / energy_before };
             scale_and_add(&mut direction, share, &better);
             finest.apply(&mut direction, &mut product);
@@ -156,11 +156,9 @@ impl PressureSolver {
                 break;
             }
             let length = energy / curvature;
-            add_scaled(q, length, &direction);
-            add_scaled(residual, -length, &product);
+            solved.flow = advance([&mut *q, &mut *residual], length, [&direction, &product]);
             energy_before = energy;
             solved.iterations += 1;
-            solved.flow = largest(residual);
         }
         solved
     }
@@ -213,22 +211,24 @@ impl PressureSolver {
     /// pressure `q` takes from the velocity there for a density that is the reference density: the difference of q over
     /// the distance of the cells, or of cell and surface.
     pub fn for_each_gradient(&self, q: &[f64], mut change: impl FnMut(usize, usize, f64)) {
-        let stencil = self.stencil();
+        (0..3).for_each(|axis| self.for_each_gradient_along(axis, q, |at, gradient| change(axis, at, gradient)));
+    }
+
+    /// The same along one axis.
+    pub(crate) fn for_each_gradient_along(&self, axis: usize, q: &[f64], mut change: impl FnMut(usize, f64)) {
         let (kinds, images) = (&self.multigrid.finest().kinds, self.images());
-        let gradient = |axis: usize, below: usize, above: usize| {
+        let gradient = |below: usize, above: usize| {
             (q[images.home(above)] - q[images.home(below)]) / f64::from(self.distances[axis][above])
         };
-        for run in stencil.runs() {
+        for run in self.stencil().runs() {
+            let at = run.at as usize;
+            let [below, above] = [[at - 1, at + 1], run.y.map(|at| at as usize), run.z.map(|at| at as usize)][axis];
             for n in 0..run.len as usize {
-                let at = run.at as usize + n;
-                let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
-                let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
-                for axis in 0..3 {
-                    change(axis, at, gradient(axis, below[axis], at));
-                    // The faces above liquid are the low faces of other cells.
-                    if kinds[above[axis]] != CellKind::Liquid {
-                        change(axis, images.home(above[axis]), gradient(axis, at, above[axis]));
-                    }
+                let (below, at, above) = (below + n, at + n, above + n);
+                change(at, gradient(below, at));
+                // The faces above liquid are the low faces of other cells.
+                if kinds[above] != CellKind::Liquid {
+                    change(images.home(above), gradient(at, above));
                 }
             }
         }
@@ -255,7 +255,7 @@ pub(crate) fn face_densities(rows: &CellRows, level_set: &[f32], density: &[f32]
 }
 
 /// Whether a face of the cell is open.
-fn is_open(grid: &PressureGrid<'_>, finder: &mut Finder<'_>, cell: Cell, at: usize) -> bool {
+fn is_open(grid: &PressureGrid<'_>, finder: &Finder<'_>, cell: Cell, at: usize) -> bool {
     (0..3).any(|axis| {
         let mut above = cell;
         above[axis] += 1;
@@ -280,20 +280,31 @@ fn clear_outside(level: &Level, field: &mut [f64]) {
 /// For each low face between liquid and air, how far from the centre of the liquid cell the surface is, in cells.
 fn surface_distances(stencil: &Stencil, level_set: &[f32], images: &Images) -> SurfaceDistances {
     let mut out: SurfaceDistances = std::array::from_fn(|_| vec![1.0; level_set.len()]);
-    let mut set = |run: &Run, n: usize| {
-        let at = run.at as usize + n;
-        let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
-        let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
-        for axis in 0..3 {
-            for (air, face) in [(below[axis], at), (above[axis], above[axis])] {
-                if level_set[air] >= -LEAST_DEPTH {
-                    let distance = level_set[at] / (level_set[at] - level_set[air]);
-                    out[axis][face] = distance.clamp(SURFACE_DISTANCE[0], SURFACE_DISTANCE[1]);
+    let distance = |at: usize, air: usize| {
+        let distance = level_set[at] / (level_set[at] - level_set[air]);
+        distance.clamp(SURFACE_DISTANCE[0], SURFACE_DISTANCE[1])
+    };
+    // Above liquid, the face is that of the air: another part of the fields.
+    let beyond = stencil.update_and_fold(out.each_mut().map(|field| &mut field[..]), |runs, first, out| {
+        let mut beyond = Vec::new();
+        for run in runs {
+            for n in 0..run.len as usize {
+                let at = run.at as usize + n;
+                let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
+                let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
+                for axis in 0..3 {
+                    if level_set[below[axis]] >= -LEAST_DEPTH {
+                        out[axis][at - first] = distance(at, below[axis]);
+                    }
+                    if level_set[above[axis]] >= -LEAST_DEPTH {
+                        beyond.push((axis, above[axis], distance(at, above[axis])));
+                    }
                 }
             }
         }
-    };
-    stencil.runs().iter().for_each(|run| (0..run.len as usize).for_each(|n| set(run, n)));
+        beyond
+    });
+    beyond.into_iter().flatten().for_each(|(axis, face, distance)| out[axis][face] = distance);
     // Liquid below a side that repeats has set the image of the face.
     let is_air = |at: usize| level_set[at] >= -LEAST_DEPTH;
     for (axis, distances) in out.iter_mut().enumerate() {

@@ -1,6 +1,7 @@
 use super::*;
 use crate::open_share::open_share;
 use crate::rows::Cell;
+use crate::stencil::Run;
 use numerics::vector::{length, sub};
 
 /// What a test solves on: liquid where `level_set` < 0, in a box of `n`³ cells of size 1 with walls all round.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::carried::{CellMaterials, MaterialPoints, Stir, TracerPoints};
 use crate::level_set::PhiView;
 use crate::pressure::LEAST_DEPTH;
-use crate::rows::{Cell, CellRows, Images};
+use crate::rows::{Cell, CellRows, Finder, Images};
 use crate::step::domain::{Domain, Obstacle};
 use crate::step::outflow::Outflow;
 use crate::step::sources::FlowAccount;
@@ -270,13 +270,13 @@ impl LiquidCells {
         let solid_velocity = solid.map(|solid| domain.solid_velocity(&rows, &open, solid));
         let is_liquid: Vec<u8> = level_set.iter().map(|phi| u8::from(*phi < -LEAST_DEPTH)).collect();
         let [mut moving, mut known] = rows.tabulate_with(
-            || (),
-            |(), cell, at| {
+            || Finder::new(&rows),
+            |finder, cell, at| {
                 let mut masks = [0, 0];
                 for axis in 0..3 {
                     let mut below = cell;
                     below[axis] -= 1;
-                    if is_liquid[at] == 1 || rows.find(below).is_some_and(|at| is_liquid[at] == 1) {
+                    if is_liquid[at] == 1 || finder.find(below).is_some_and(|at| is_liquid[at] == 1) {
                         let is_open = open[axis][at] > 0.0;
                         masks[0] |= u8::from(is_open) << axis;
                         masks[1] |= u8::from(is_open || domain.wall_at(axis, cell).is_some()) << axis;

@@ -1,6 +1,8 @@
 //! The end of a substep: what is left of a velocity once it neither compresses the liquid nor differs from what viscosity
 //! allows.
 
+use numerics::parallel;
+
 use crate::carried::CellMaterials;
 use crate::pressure::{PressureGrid, PressureSolver, Stop, face_densities};
 use crate::rows::CellRows;
@@ -156,13 +158,14 @@ impl Projection<'_> {
 
 /// The net inflow of each liquid cell, m/s.
 fn inflow(solver: &PressureSolver, cells: &LiquidCells, faces: &FaceFields<f32>) -> Vec<f64> {
-    let through = std::array::from_fn(|axis| {
+    let mut through: FaceFields<f64> = Default::default();
+    parallel::for_each(through.iter_mut().enumerate(), |_, (axis, through)| {
         let flow = |(u, share): (&f32, &f32)| f64::from(*u) * f64::from(*share);
         let mut own: Vec<f64> = faces[axis].iter().zip(&cells.open[axis]).map(flow).collect();
         if let Some(solid) = &cells.solid_velocity {
             own.iter_mut().zip(covered(axis, &cells.open, solid)).for_each(|(own, covered)| *own += covered);
         }
-        solver.rows().resampled(&cells.rows, &own, 0.0)
+        *through = solver.rows().resampled(&cells.rows, &own, 0.0);
     });
     net(solver.rows(), solver.stencil(), &through)
 }
@@ -202,15 +205,15 @@ fn subtract_gradient(
     q: &[f64],
     faces: &mut FaceFields<f32>,
 ) {
-    let mut gradient: FaceFields<f32> = std::array::from_fn(|_| vec![0.0; solver.rows().len()]);
-    solver.for_each_gradient(q, |axis, at, value| gradient[axis][at] = value as f32);
-    for axis in 0..3 {
-        let mut gradient = cells.rows.resampled(solver.rows(), &gradient[axis], 0.0);
+    parallel::for_each(faces.iter_mut().enumerate(), |_, (axis, faces)| {
+        let mut gradient = vec![0.0; solver.rows().len()];
+        solver.for_each_gradient_along(axis, q, |at, value| gradient[at] = value as f32);
+        let mut gradient = cells.rows.resampled(solver.rows(), &gradient, 0.0);
         if let Some(density) = density {
             gradient.iter_mut().zip(&density[axis]).for_each(|(gradient, density)| *gradient /= density);
         }
         let open = cells.open[axis].iter().map(|open| *open > 0.0);
-        let taken = faces[axis].iter_mut().zip(&gradient).zip(open);
+        let taken = faces.iter_mut().zip(&gradient).zip(open);
         taken.filter(|(_, is_open)| *is_open).for_each(|((u, gradient), _)| *u -= gradient);
-    }
+    });
 }

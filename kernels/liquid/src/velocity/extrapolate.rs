@@ -15,6 +15,9 @@ use crate::velocity::{ALL_FACES, FaceFields, FaceMask};
 /// Values that one thread goes through.
 const CHUNK: usize = 8192;
 
+/// Rows that one thread cuts into lines.
+const ROWS: usize = 64;
+
 /// Stored cells next to each other along x; each row beside them is stored for all of them or for none.
 #[derive(Clone, Copy, Debug)]
 struct Line {
@@ -326,12 +329,18 @@ impl<const F: usize> Layer<'_, F> {
     }
 }
 
-/// Cuts spans wherever a row beside them begins or ends.
+/// Cuts spans wherever a row beside them begins or ends. In parallel.
 fn lines(rows: &CellRows) -> Vec<Line> {
+    let all: Vec<_> = rows.rows().collect();
+    parallel::concat(parallel::map(all.chunks(ROWS), |_, part| lines_of(rows, part)))
+}
+
+/// The lines of some rows.
+fn lines_of(rows: &CellRows, part: &[([i32; 2], &[RowSpan])]) -> Vec<Line> {
     let (mut lines, nowhere) = (Vec::new(), rows.len() as u32);
-    for ([y, z], spans) in rows.rows() {
+    for ([y, z], spans) in part {
         let mut beside = BESIDE.map(|[j, k]| rows.row(y + j, z + k));
-        for span in spans {
+        for span in *spans {
             let mut x = span.start;
             while x < span.end {
                 let mut end = span.end;

@@ -1,7 +1,7 @@
 //! The viscous equation on a grid with cells twice as large: the same discretisation, from means of masses and
 //! viscosities over the volume that each coarse value stands for.
 
-use crate::rows::{Cell, CellRows, Periods};
+use crate::rows::{Cell, CellRows, Finder, Periods};
 use crate::stencil::Stencil;
 
 use super::extension::Extensions;
@@ -15,7 +15,8 @@ const LEAST_MASS: f32 = 0.25;
 pub(super) fn coarsened(fine: &Level) -> Option<Level> {
     let periods = fine.images.periods().halved();
     let candidates = fine.rows().halved();
-    let is_liquid = candidates.tabulate(|cell| periods.holds(cell) && is_liquid(fine, cell));
+    let near = || Finer::new(fine);
+    let [is_liquid] = candidates.tabulate_with(near, |fine, cell, _| [periods.holds(cell) && fine.is_liquid(cell)]);
     let liquid = thick(fine, periods, candidates.filtered(|_, at| is_liquid[at]));
     if liquid.is_empty() {
         return None;
@@ -24,10 +25,11 @@ pub(super) fn coarsened(fine: &Level) -> Option<Level> {
     let images = periods.images(&rows);
     // Next to liquid, with the upper faces of what is there.
     let active = periods.gathered(liquid.dilated(1).grown_up());
-    let is_liquid = |cell: Cell| liquid.find(periods.home(cell)).is_some();
-    let kinds: FaceFields<FaceKind> = rows.tabulate_each(|cell| {
+    let start = || (Finer::new(fine), Finder::new(&liquid));
+    let kinds: FaceFields<FaceKind> = rows.tabulate_with(start, |(fine, liquid), cell, _| {
+        let is_liquid = |cell: Cell| liquid.find(periods.home(cell)).is_some();
         [0, 1, 2].map(|axis| {
-            if is_solid(fine, periods.home(cell), axis) {
+            if fine.is_solid(periods.home(cell), axis) {
                 FaceKind::Solid
             } else if is_liquid(cell) || is_liquid(lower(cell, axis)) {
                 FaceKind::Free
@@ -37,22 +39,28 @@ pub(super) fn coarsened(fine: &Level) -> Option<Level> {
         })
     });
     let field = |values: Vec<f32>| rows.resampled(&active, &values, 0.0);
-    let masses: FaceFields<f32> = active.tabulate_each(|cell| {
-        let is_free = |axis: usize| rows.find(cell).is_some_and(|at| kinds[axis][at] == FaceKind::Free);
-        [0, 1, 2].map(|axis| if is_free(axis) { mass(fine, cell, axis).max(LEAST_MASS) } else { 0.0 })
+    let start = || (Finer::new(fine), Finder::new(&rows), Finder::new(&active));
+    let masses: FaceFields<f32> = active.tabulate_with(start, |(fine, rows, _), cell, _| {
+        let at = rows.find(cell);
+        let is_free = |axis: usize| at.is_some_and(|at| kinds[axis][at] == FaceKind::Free);
+        [0, 1, 2].map(|axis| if is_free(axis) { fine.mass(cell, axis).max(LEAST_MASS) } else { 0.0 })
     });
     let extensions = Extensions::new(&rows, &images, &kinds);
     // A stress on a face that is not active would have no reaction there, and the matrix no symmetry.
-    let has_velocity = |axis: usize, cell: Cell| {
+    let has_velocity = |rows: &Finder<'_>, active: &Finder<'_>, axis: usize, cell: Cell| {
         let cell = periods.home(cell);
         let is_known = |at: usize| kinds[axis][at] != FaceKind::Air || extensions.reaches(axis, at);
         active.find(cell).is_some() && rows.find(cell).is_some_and(is_known)
     };
-    let normal = active.tabulate(|cell| normal(fine, cell, has_velocity));
-    let shear: FaceFields<f32> =
-        active.tabulate_each(|cell| [0, 1, 2].map(|axis| shear(fine, cell, axis, has_velocity)));
-    let (mass, normal, shear) = (masses.map(field), field(normal), shear.map(field));
-    let liquid = rows.tabulate(is_liquid);
+    let stresses = active.tabulate_with(start, |(fine, rows, active), cell, _| {
+        let has_velocity = |axis: usize, cell: Cell| has_velocity(rows, active, axis, cell);
+        let shear = |axis: usize| fine.shear(cell, axis, has_velocity);
+        [fine.normal(cell, has_velocity), shear(0), shear(1), shear(2)]
+    });
+    let [normal, shear @ ..] = stresses.map(field);
+    let mass = masses.map(field);
+    let [liquid] =
+        rows.tabulate_with(|| Finder::new(&liquid), |liquid, cell, _| [liquid.find(periods.home(cell)).is_some()]);
     let stencil = Stencil::within(rows.clone(), active.clone());
     let level = Level {
         stencil,
@@ -72,15 +80,19 @@ pub(super) fn coarsened(fine: &Level) -> Option<Level> {
 /// own: a correction there would bend it freely.
 fn thick(fine: &Level, periods: Periods, mut cells: CellRows) -> CellRows {
     loop {
-        let is_held = |near: Cell, face: Cell, axis: usize| {
-            cells.find(periods.home(near)).is_some() || is_solid(fine, periods.home(face), axis)
-        };
-        let holds = |cell: Cell, axis: usize| {
-            let mut above = cell;
-            above[axis] += 1;
-            is_held(above, above, axis) || is_held(lower(cell, axis), cell, axis)
-        };
-        let kept = cells.filtered(|cell, _| (0..3).all(|axis| holds(cell, axis)));
+        let start = || (Finer::new(fine), Finder::new(&cells));
+        let [holds] = cells.tabulate_with(start, |(fine, cells), cell, _| {
+            let is_held = |near: Cell, face: Cell, axis: usize| {
+                cells.find(periods.home(near)).is_some() || fine.is_solid(periods.home(face), axis)
+            };
+            let holds = |axis: usize| {
+                let mut above = cell;
+                above[axis] += 1;
+                is_held(above, above, axis) || is_held(lower(cell, axis), cell, axis)
+            };
+            [(0..3).all(holds)]
+        });
+        let kept = cells.filtered(|_, at| holds[at]);
         if kept.len() == cells.len() {
             return kept;
         }
@@ -88,81 +100,101 @@ fn thick(fine: &Level, periods: Periods, mut cells: CellRows) -> CellRows {
     }
 }
 
-/// Whether at least as many children are liquid as air.
-fn is_liquid(fine: &Level, coarse: Cell) -> bool {
-    let (mut liquid, mut air) = (0, 0);
-    for child in 0..8 {
-        let offset = [child & 1, child >> 1 & 1, child >> 2];
-        let Some(at) = fine.rows().find([0, 1, 2].map(|axis| 2 * coarse[axis] + offset[axis])) else { continue };
-        if fine.liquid[at] {
-            liquid += 1;
-        } else if fine.kinds.iter().any(|kinds| kinds[at] == FaceKind::Air) {
-            air += 1;
-        }
+/// The finer grid, for a thread to look cells up in.
+struct Finer<'a> {
+    level: &'a Level,
+    cells: Finder<'a>,
+}
+
+impl<'a> Finer<'a> {
+    fn new(level: &'a Level) -> Self {
+        Self { level, cells: Finder::new(level.rows()) }
     }
-    liquid > 0 && liquid >= air
-}
 
-/// Whether at least two of the four fine faces are solid.
-fn is_solid(fine: &Level, coarse: Cell, axis: usize) -> bool {
-    let (side, other) = ((axis + 1) % 3, (axis + 2) % 3);
-    let solid = (0..4).filter(|child| {
-        let mut cell = coarse.map(|n| 2 * n);
-        cell[side] += child & 1;
-        cell[other] += child >> 1;
-        fine.rows().find(cell).is_some_and(|at| fine.kinds[axis][at] == FaceKind::Solid)
-    });
-    solid.count() >= 2
-}
+    /// Whether at least as many children are liquid as air.
+    fn is_liquid(&self, coarse: Cell) -> bool {
+        let fine = self.level;
+        let (mut liquid, mut air) = (0, 0);
+        for child in 0..8 {
+            let offset = [child & 1, child >> 1 & 1, child >> 2];
+            let Some(at) = self.cells.find([0, 1, 2].map(|axis| 2 * coarse[axis] + offset[axis])) else { continue };
+            if fine.liquid[at] {
+                liquid += 1;
+            } else if fine.kinds.iter().any(|kinds| kinds[at] == FaceKind::Air) {
+                air += 1;
+            }
+        }
+        liquid > 0 && liquid >= air
+    }
 
-/// The sum over the fine values in a coarse one's volume, each times its share of that volume: `halfway` along the axes
-/// where the coarse value lies on a plane of fine ones, so that those beside it count half.
-fn sum(fine: &Level, coarse: Cell, halfway: [bool; 3], value: impl Fn(Cell, usize) -> f32) -> f32 {
-    let steps =
-        halfway.map(|halfway| if halfway { [(-1, 0.5), (0, 1.0), (1, 0.5)] } else { [(0, 1.0), (1, 1.0), (0, 0.0)] });
-    let mut sum = 0.0;
-    for (dz, weight_z) in steps[2] {
-        for (dy, weight_y) in steps[1] {
-            for (dx, weight_x) in steps[0] {
-                let weight = weight_x * weight_y * weight_z;
-                let cell = [2 * coarse[0] + dx, 2 * coarse[1] + dy, 2 * coarse[2] + dz];
-                if let Some(at) = fine.rows().find(cell).filter(|_| weight > 0.0) {
-                    sum += weight * value(cell, fine.images.home(at));
+    /// Whether at least two of the four fine faces are solid.
+    fn is_solid(&self, coarse: Cell, axis: usize) -> bool {
+        let fine = self.level;
+        let (side, other) = ((axis + 1) % 3, (axis + 2) % 3);
+        let solid = (0..4).filter(|child| {
+            let mut cell = coarse.map(|n| 2 * n);
+            cell[side] += child & 1;
+            cell[other] += child >> 1;
+            self.cells.find(cell).is_some_and(|at| fine.kinds[axis][at] == FaceKind::Solid)
+        });
+        solid.count() >= 2
+    }
+
+    /// The sum over the fine values in a coarse one's volume, each times its share of that volume: `halfway` along the axes
+    /// where the coarse value lies on a plane of fine ones, so that those beside it count half.
+    fn sum(&self, coarse: Cell, halfway: [bool; 3], value: impl Fn(usize) -> f32) -> f32 {
+        let fine = self.level;
+        let steps = halfway
+            .map(|halfway| if halfway { [(-1, 0.5), (0, 1.0), (1, 0.5)] } else { [(0, 1.0), (1, 1.0), (0, 0.0)] });
+        let mut sum = 0.0;
+        for (dz, weight_z) in steps[2] {
+            for (dy, weight_y) in steps[1] {
+                for (dx, weight_x) in steps[0] {
+                    let weight = weight_x * weight_y * weight_z;
+                    let cell = [2 * coarse[0] + dx, 2 * coarse[1] + dy, 2 * coarse[2] + dz];
+                    if weight > 0.0
+                        && let Some(at) = self.cells.find(cell)
+                    {
+                        sum += weight * value(fine.images.home(at));
+                    }
                 }
             }
         }
+        sum
     }
-    sum
-}
 
-fn mass(fine: &Level, coarse: Cell, axis: usize) -> f32 {
-    sum(fine, coarse, [0, 1, 2].map(|other| other == axis), |_, at| fine.mass[axis][at])
-}
-
-/// A quarter of the sum, as the same velocities have a quarter of the squared strain. 0 where a face has no velocity.
-fn normal(fine: &Level, coarse: Cell, has_velocity: impl Fn(usize, Cell) -> bool) -> f32 {
-    let has_both = |axis: usize| {
-        let mut above = coarse;
-        above[axis] += 1;
-        has_velocity(axis, coarse) && has_velocity(axis, above)
-    };
-    if (0..3).all(has_both) { 0.25 * sum(fine, coarse, [false; 3], |_, at| fine.normal[at]) } else { 0.0 }
-}
-
-/// 0 where one of the four faces at the edge has no velocity.
-fn shear(fine: &Level, coarse: Cell, axis: usize, has_velocity: impl Fn(usize, Cell) -> bool) -> f32 {
-    let (side, other) = ((axis + 1) % 3, (axis + 2) % 3);
-    let faces = [(side, coarse), (side, lower(coarse, other)), (other, coarse), (other, lower(coarse, side))];
-    if !faces.into_iter().all(|(axis, cell)| has_velocity(axis, cell)) {
-        return 0.0;
+    fn mass(&self, coarse: Cell, axis: usize) -> f32 {
+        let fine = self.level;
+        self.sum(coarse, [0, 1, 2].map(|other| other == axis), |at| fine.mass[axis][at])
     }
-    let halfway = [0, 1, 2].map(|along| along != axis);
-    let total = sum(fine, coarse, halfway, |_, at| fine.shear[axis][at]);
-    // What lies inside a solid does not soften the edge beside it.
-    let outside = sum(fine, coarse, halfway, |_, at| {
-        let is_inside =
-            fine.shear[axis][at] == 0.0 && [side, other].map(|axis| fine.kinds[axis][at]) == [FaceKind::Solid; 2];
-        if is_inside { 0.0 } else { 1.0 }
-    });
-    if outside > 0.0 { 2.0 * total / outside } else { 0.0 }
+
+    /// A quarter of the sum, as the same velocities have a quarter of the squared strain. 0 where a face has no velocity.
+    fn normal(&self, coarse: Cell, has_velocity: impl Fn(usize, Cell) -> bool) -> f32 {
+        let fine = self.level;
+        let has_both = |axis: usize| {
+            let mut above = coarse;
+            above[axis] += 1;
+            has_velocity(axis, coarse) && has_velocity(axis, above)
+        };
+        if (0..3).all(has_both) { 0.25 * self.sum(coarse, [false; 3], |at| fine.normal[at]) } else { 0.0 }
+    }
+
+    /// 0 where one of the four faces at the edge has no velocity.
+    fn shear(&self, coarse: Cell, axis: usize, has_velocity: impl Fn(usize, Cell) -> bool) -> f32 {
+        let fine = self.level;
+        let (side, other) = ((axis + 1) % 3, (axis + 2) % 3);
+        let faces = [(side, coarse), (side, lower(coarse, other)), (other, coarse), (other, lower(coarse, side))];
+        if !faces.into_iter().all(|(axis, cell)| has_velocity(axis, cell)) {
+            return 0.0;
+        }
+        let halfway = [0, 1, 2].map(|along| along != axis);
+        let total = self.sum(coarse, halfway, |at| fine.shear[axis][at]);
+        // What lies inside a solid does not soften the edge beside it.
+        let outside = self.sum(coarse, halfway, |at| {
+            let is_inside =
+                fine.shear[axis][at] == 0.0 && [side, other].map(|axis| fine.kinds[axis][at]) == [FaceKind::Solid; 2];
+            if is_inside { 0.0 } else { 1.0 }
+        });
+        if outside > 0.0 { 2.0 * total / outside } else { 0.0 }
+    }
 }

@@ -1,6 +1,7 @@
 //! One multigrid V-cycle: an approximate solution of A·u = b in `f32`.
 
-use crate::fields::{add_scaled, dot, scale_and_add};
+use crate::fields::{add_scaled, divide_into, dot, in_parts, scale_and_add};
+use crate::stencil::Run;
 use crate::transfer::{Place, add_interpolated, restrict};
 
 use super::coarsen::coarsened;
@@ -19,6 +20,8 @@ pub(super) struct Multigrid {
     levels: Vec<Level>,
     /// Of each level but the coarsest, towards the next.
     scales: Vec<FaceFields<f32>>,
+    /// Whether there is one grid alone, which smoothing solves.
+    is_light: bool,
 }
 
 /// The fields of a level during a cycle.
@@ -33,9 +36,10 @@ struct Scratch {
 pub(super) struct Workspace(Vec<Scratch>);
 
 impl Multigrid {
-    pub(super) fn new(finest: Level) -> Self {
+    /// `is_light`: mass outweighs viscosity everywhere, so that no error is too smooth for the smoother.
+    pub(super) fn new(finest: Level, is_light: bool) -> Self {
         let mut levels = vec![finest];
-        loop {
+        while !is_light {
             let fine = &levels[levels.len() - 1];
             let cells = fine.stencil.active().len();
             if cells <= COARSEST {
@@ -49,7 +53,7 @@ impl Multigrid {
             levels.push(coarse);
         }
         let scales = levels.windows(2).map(|pair| scales(&pair[0], &pair[1])).collect();
-        Self { levels, scales }
+        Self { levels, scales, is_light }
     }
 
     /// The grids, the finest first.
@@ -80,18 +84,15 @@ impl Multigrid {
         largest: f64,
         out: &mut FaceFields<f64>,
     ) {
-        let finest = &mut workspace.0[0];
-        for axis in 0..3 {
+        for (to, from) in workspace.0[0].b.iter_mut().zip(b) {
             // Largest entry 1: neither overflow nor denormals, whatever the unit.
-            for (to, from) in finest.b[axis].iter_mut().zip(&b[axis]) {
-                *to = (from / largest) as f32;
-            }
+            divide_into(to, from, largest);
         }
         self.cycle(0, &mut workspace.0);
-        for axis in 0..3 {
-            for (to, from) in out[axis].iter_mut().zip(&workspace.0[0].smoothing.u[axis]) {
-                *to = f64::from(*from) * largest;
-            }
+        for (to, from) in out.iter_mut().zip(&workspace.0[0].smoothing.u) {
+            in_parts(to, |first, part| {
+                part.iter_mut().zip(&from[first..]).for_each(|(to, from)| *to = f64::from(*from) * largest);
+            });
         }
     }
 
@@ -100,6 +101,10 @@ impl Multigrid {
         let (fine, coarser) = scratch.split_at_mut(1);
         let Scratch { smoothing, b } = &mut fine[0];
         let Some(scale) = self.scales.get(number) else {
+            if self.is_light {
+                level.smooth(true, b, smoothing);
+                return level.smooth(false, b, smoothing);
+            }
             return solve_coarsest(level, b, &mut smoothing.u);
         };
         let coarse = &self.levels[number + 1];
@@ -193,22 +198,25 @@ fn scales(fine: &Level, coarse: &Level) -> FaceFields<f32> {
     let is_extended = |axis, at| {
         coarse.extensions.as_ref().is_some_and(|extensions| extensions.reaches(axis, coarse.images.home(at)))
     };
-    let scale = |cell, axis: usize| {
-        if fine.rows().find(cell).is_none_or(|at| fine.kinds[axis][at] != FaceKind::Free) {
-            return 0.0;
-        }
-        let (mut sum, mut reaches_free) = (0.0, false);
-        Place::Face(axis).each_parent(cell, |parent, weight| {
-            let at = coarse.rows().find(parent);
-            let kind = at.map_or(FaceKind::Air, |at| coarse.kinds[axis][at]);
-            reaches_free |= kind == FaceKind::Free;
-            if kind != FaceKind::Air || at.is_some_and(|at| is_extended(axis, at)) {
-                sum += weight;
+    let ones = vec![1.0; fine.rows().len()];
+    let interpolated = |axis: usize, counts: &dyn Fn(usize) -> bool| {
+        let counted: Vec<f32> = (0..coarse.rows().len()).map(|at| f32::from(counts(at))).collect();
+        let mut shares = vec![0.0; fine.rows().len()];
+        add_interpolated(Place::Face(axis), &fine.stencil, coarse.rows(), &ones, &counted, &mut shares);
+        shares
+    };
+    std::array::from_fn(|axis| {
+        let kinds = &coarse.kinds[axis];
+        let mut scales = interpolated(axis, &|at| kinds[at] == FaceKind::Free);
+        // Shares are multiples of 1/32, so no sum of them is rounded.
+        let counted = interpolated(axis, &|at| kinds[at] != FaceKind::Air || is_extended(axis, at));
+        fine.stencil.update([&mut scales], |runs, first, [scales]| {
+            for at in runs.iter().flat_map(Run::range) {
+                let scale = &mut scales[at - first];
+                let reaches_free = *scale > 0.0 && fine.kinds[axis][at] == FaceKind::Free;
+                *scale = if reaches_free { 1.0 / counted[at] } else { 0.0 };
             }
         });
-        if reaches_free { 1.0 / sum } else { 0.0 }
-    };
-    let active = fine.stencil.active();
-    let scales: FaceFields<f32> = active.tabulate_each(|cell| [0, 1, 2].map(|axis| scale(cell, axis)));
-    scales.map(|scale| fine.rows().resampled(active, &scale, 0.0))
+        scales
+    })
 }

@@ -6,7 +6,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::rows::{Cell, CellRows, Images};
+use numerics::parallel;
+
+use crate::rows::{Cell, CellRows, Finder, Images};
 
 use super::level::{FaceKind, Real};
 use crate::velocity::FaceFields;
@@ -14,13 +16,19 @@ use crate::velocity::FaceFields;
 /// Steps outwards from free faces: along one axis, then along another.
 const LAYERS: usize = 2;
 
+/// Weights that one thread goes through faster than two.
+const FEW: usize = 4096;
+
 /// Of the faces along all three axes.
 #[derive(Clone, Debug)]
 pub(super) struct Extensions([Extension; 3]);
 
 impl Extensions {
     pub(super) fn new(rows: &CellRows, images: &Images, kinds: &FaceFields<FaceKind>) -> Self {
-        Self([0, 1, 2].map(|axis| Extension::new(rows, images, &kinds[axis])))
+        let mut extensions = Self(Default::default());
+        let of_axes = extensions.0.iter_mut().zip(kinds);
+        parallel::for_each(of_axes, |_, (extension, kinds)| *extension = Extension::new(rows, images, kinds));
+        extensions
     }
 
     /// Whether a face is extended.
@@ -30,17 +38,27 @@ impl Extensions {
 
     /// Sets the velocities of extended faces.
     pub(super) fn extend<T: Real>(&self, u: &mut FaceFields<T>) {
-        self.0.iter().zip(u).for_each(|(extension, u)| extension.extend(u));
+        self.for_each_axis(u, Extension::extend);
     }
 
     /// The transpose: moves the forces on extended faces to free ones.
     pub(super) fn gather<T: Real>(&self, force: &mut FaceFields<T>) {
-        self.0.iter().zip(force).for_each(|(extension, force)| extension.gather(force));
+        self.for_each_axis(force, Extension::gather);
     }
 
     /// Sets the velocities of extended faces back to 0.
     pub(super) fn clear<T: Real>(&self, u: &mut FaceFields<T>) {
         self.0.iter().zip(u).for_each(|(extension, u)| extension.clear(u));
+    }
+
+    /// Calls `f` with the extension along each axis and the field there; in parallel where that is worth it.
+    fn for_each_axis<T: Real>(&self, fields: &mut FaceFields<T>, f: impl Fn(&Extension, &mut [T]) + Sync) {
+        let pairs = self.0.iter().zip(fields);
+        if self.0.iter().map(|extension| extension.sources.len()).sum::<usize>() < FEW {
+            pairs.for_each(|(extension, field)| f(extension, field));
+        } else {
+            parallel::for_each(pairs, |_, (extension, field)| f(extension, field));
+        }
     }
 
     /// Adds to the diagonal of free faces a bound of what extended ones add to their rows.
@@ -66,30 +84,34 @@ struct Extension {
 
 impl Extension {
     fn new(rows: &CellRows, images: &Images, kinds: &[FaceKind]) -> Self {
-        let mut known: BTreeMap<u32, Vec<(u32, f32)>> = BTreeMap::new();
+        // The extended faces so far with what they are a mix of, and the number of each in this list.
+        let mut known: Vec<(u32, Vec<(u32, f32)>)> = Vec::new();
+        let mut number: Vec<Option<u32>> = vec![None; rows.len()];
+        let cells = Finder::new(rows);
         let near = |cell: Cell, along: usize, by: i32| {
             let mut cell = cell;
             cell[along] += by;
-            rows.find(cell).map(|at| images.home(at) as u32)
+            cells.find(cell).map(|at| images.home(at) as u32)
         };
         for _ in 0..LAYERS {
             // What a face is a mix of, if it has a velocity so far.
             let mix = |at: u32| match kinds[at as usize] {
                 FaceKind::Free => Some(vec![(at, 1.0)]),
                 FaceKind::Solid => Some(Vec::new()),
-                FaceKind::Air => known.get(&at).cloned(),
+                FaceKind::Air => number[at as usize].map(|number| known[number as usize].1.clone()),
             };
             let mut layer = Vec::new();
             for (at, cell) in (0_u32..).zip(rows.iter()) {
-                if kinds[at as usize] != FaceKind::Air || known.contains_key(&at) || !images.is_home(at as usize) {
+                if kinds[at as usize] != FaceKind::Air || number[at as usize].is_some() || !images.is_home(at as usize)
+                {
                     continue;
                 }
                 let mut lines: Vec<Vec<(u32, f32)>> = Vec::new();
                 for (along, by) in [(0, -1), (0, 1), (1, -1), (1, 1), (2, -1), (2, 1)] {
-                    let first =
-                        near(cell, along, by).filter(|at| kinds[*at as usize] != FaceKind::Solid).and_then(&mix);
-                    let second = near(cell, along, 2 * by).and_then(&mix);
-                    if let (Some(first), Some(second)) = (first, second) {
+                    let first = near(cell, along, by).filter(|at| kinds[*at as usize] != FaceKind::Solid);
+                    if let Some(first) = first.and_then(&mix)
+                        && let Some(second) = near(cell, along, 2 * by).and_then(&mix)
+                    {
                         let twice = first.into_iter().map(|(source, weight)| (source, 2.0 * weight));
                         lines.push(twice.chain(second.into_iter().map(|(source, weight)| (source, -weight))).collect());
                     }
@@ -98,8 +120,12 @@ impl Extension {
                     layer.push((at, mean(&lines)));
                 }
             }
-            known.extend(layer);
+            for (at, mix) in layer {
+                number[at as usize] = Some(known.len() as u32);
+                known.push((at, mix));
+            }
         }
+        known.sort_unstable_by_key(|(target, _)| *target);
         let mut extension = Self::default();
         for (target, mix) in known {
             extension.sources.extend(mix);

@@ -4,6 +4,7 @@
 
 use numerics::simd::{Path, kernel};
 
+use crate::fields::in_parts;
 use crate::rows::{Cell, CellRows, Images};
 use crate::stencil::{Run, Stencil};
 use crate::velocity::FaceFields;
@@ -138,12 +139,12 @@ impl Level {
             extensions.gather(out);
             extensions.clear(u);
         }
-        for axis in 0..3 {
-            for (out, mass) in out[axis].iter_mut().zip(&self.mass[axis]) {
-                if *mass == 0.0 {
-                    *out = 0.0;
+        for (out, mass) in out.iter_mut().zip(&self.mass) {
+            in_parts(out, |first, part| {
+                for (out, mass) in part.iter_mut().zip(&mass[first..]) {
+                    *out = if *mass == 0.0 { 0.0 } else { *out };
                 }
-            }
+            });
         }
     }
 
@@ -310,7 +311,13 @@ kernel! {
 
 /// What a product needs of its numbers.
 pub(super) trait Real:
-    Copy + Default + From<f32> + std::ops::Sub<Output = Self> + std::ops::Mul<Output = Self> + std::ops::Add<Output = Self>
+    Copy
+    + Default
+    + Send
+    + From<f32>
+    + std::ops::Sub<Output = Self>
+    + std::ops::Mul<Output = Self>
+    + std::ops::Add<Output = Self>
 {
 }
 impl Real for f32 {}

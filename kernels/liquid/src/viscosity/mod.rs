@@ -10,6 +10,8 @@
 //! complement one cycle of the pressure equation plus the resistance of viscosity (Cahouet and Chabard 1988). Rigid motions of
 //! every component that is free to move are solved for exactly in each iteration; without that, nearly rigid liquid
 //! takes five times the iterations and loses its spin.
+//! Where a liquid's momentum outweighs its viscosity in every cell, smoothing alone does for both, and neither coarser grids nor
+//! rigid motions are set up.
 
 mod alone;
 mod coarsen;
@@ -21,7 +23,7 @@ mod setup;
 #[cfg(test)]
 mod tests;
 
-use crate::fields::{add_scaled, dot, largest};
+use crate::fields::{add_scaled, in_parts, largest, weighted_dot};
 use crate::pressure::{PressureGrid, PressureSolver, PressureWorkspace, face_densities};
 use crate::rows::{Cell, CellRows, Periods};
 use crate::stencil::Stencil;
@@ -96,6 +98,10 @@ struct Unknowns {
     q: Vec<f64>,
 }
 
+/// The largest ν̂ ÷ density with which a velocity's own momentum is half of the matrix's diagonal in the liquid: smoothing
+/// then reaches every error, rigid motions too.
+const LIGHT: f32 = 0.125;
+
 /// Directions kept for orthogonality, at most; the oldest is dropped first. Ten are not enough where the viscosity jumps
 /// by 1e8.
 const KEPT: usize = 40;
@@ -119,9 +125,10 @@ impl StokesSolver {
         let pressure_grid = PressureGrid { rows, level_set, weights: [x, y, z], periods };
         let pressure = PressureSolver::new(&pressure_grid);
         let (level, flow) = setup::set_up(grid, &pressure);
-        let rigid = RigidMotions::find(&level);
+        let is_light = largest_viscosity(grid) <= LIGHT;
+        let rigid = if is_light { RigidMotions::default() } else { RigidMotions::find(&level) };
         let resistance = resistance(&level, &flow, &pressure);
-        Self { pressure, viscous: Multigrid::new(level), rigid, flow, resistance }
+        Self { pressure, viscous: Multigrid::new(level, is_light), rigid, flow, resistance }
     }
 
     /// The cells that fields of this solver are stored for.
@@ -222,11 +229,13 @@ impl StokesSolver {
         let level = self.viscous.finest();
         level.apply(u, &mut work.stresses, out);
         self.add_gradient(q, out);
-        for axis in 0..3 {
-            for at in 0..q.len() {
-                let momentum = f64::from(level.mass[axis][at]) * before[axis][at];
-                out[axis][at] = if self.is_free(axis, at) { momentum - out[axis][at] } else { 0.0 };
-            }
+        for (axis, out) in out.iter_mut().enumerate() {
+            in_parts(out, |first, part| {
+                for (at, out) in (first..).zip(part) {
+                    let momentum = f64::from(level.mass[axis][at]) * before[axis][at];
+                    *out = if self.is_free(axis, at) { momentum - *out } else { 0.0 };
+                }
+            });
         }
     }
 
@@ -235,18 +244,19 @@ impl StokesSolver {
         let flow = largest(&residual.q);
         if flow > 0.0 {
             self.pressure.precondition(&mut work.pressure, &residual.q, flow, &mut z.q);
-            for ((z, residual), resistance) in z.q.iter_mut().zip(&residual.q).zip(&self.resistance) {
-                *z += resistance * residual;
-            }
+            in_parts(&mut z.q, |first, part| {
+                let of_part = residual.q[first..].iter().zip(&self.resistance[first..]);
+                part.iter_mut().zip(of_part).for_each(|(z, (residual, resistance))| *z += resistance * residual);
+            });
         } else {
             z.q.fill(0.0);
         }
         work.force.iter_mut().for_each(|force| force.fill(0.0));
         self.add_gradient(&mut z.q, &mut work.force);
-        for axis in 0..3 {
-            for (force, residual) in work.force[axis].iter_mut().zip(&residual.u[axis]) {
-                *force = residual - *force;
-            }
+        for (force, residual) in work.force.iter_mut().zip(&residual.u) {
+            in_parts(force, |first, part| {
+                part.iter_mut().zip(&residual[first..]).for_each(|(force, residual)| *force = residual - *force);
+            });
         }
         self.precondition_velocity(work, &mut z.u);
     }
@@ -254,8 +264,8 @@ impl StokesSolver {
     /// `z` ≈ the viscous velocity for the force in `work`.
     fn precondition_velocity(&self, work: &mut Work, z: &mut FaceFields<f64>) {
         let level = self.viscous.finest();
-        for axis in 0..3 {
-            work.bending[axis].copy_from_slice(&work.force[axis]);
+        for (bending, force) in work.bending.iter_mut().zip(&work.force) {
+            in_parts(bending, |first, part| part.copy_from_slice(&force[first..][..part.len()]));
         }
         self.rigid.remove(level, &mut work.bending);
         let force = work.bending.iter().map(|force| largest(force)).fold(0.0, f64::max);
@@ -320,10 +330,10 @@ impl StokesSolver {
         let inverse = &self.viscous.finest().inverse_diagonal;
         let mut sum = 0.0;
         for axis in 0..3 {
-            sum += weighted(&a.u[axis], &b.u[axis], |at| f64::from(inverse[axis][at]));
+            sum += weighted_dot(&a.u[axis], &b.u[axis], |at| f64::from(inverse[axis][at]));
         }
         let of_pressure = self.pressure.inverse_diagonal();
-        sum + weighted(&a.q, &b.q, |at| f64::from(of_pressure[at]) + self.resistance[at])
+        sum + weighted_dot(&a.q, &b.q, |at| f64::from(of_pressure[at]) + self.resistance[at])
     }
 }
 
@@ -358,6 +368,12 @@ impl Unknowns {
         }
         add_scaled(&mut self.q, share, &other.q);
     }
+}
+
+/// The largest ν̂ ÷ density of liquid.
+fn largest_viscosity(grid: &StokesGrid<'_>) -> f32 {
+    let liquid = grid.viscosity.iter().zip(grid.density).zip(grid.level_set).filter(|(_, phi)| **phi < 0.0);
+    liquid.fold(0.0, |most, ((viscosity, density), _)| most.max(viscosity / density))
 }
 
 /// What a pressure has to be in a liquid cell, ÷ its net outflow, where viscosity alone resists: the inverse of the
@@ -395,9 +411,3 @@ fn resistance(level: &Level, flow: &Flow, pressure: &PressureSolver) -> Vec<f64>
 
 /// Viscosities around a face ÷ its mass, below which they are rounding.
 const LEAST_VISCOUS: f64 = 1e-6;
-
-/// Σ weight · a · b.
-fn weighted(a: &[f64], b: &[f64], weight: impl Fn(usize) -> f64 + Sync) -> f64 {
-    let weighted: Vec<f64> = a.iter().enumerate().map(|(at, a)| a * weight(at)).collect();
-    dot(&weighted, b)
-}

@@ -7,7 +7,8 @@
 use nalgebra::{Matrix6, Vector6};
 use numerics::parallel;
 
-use crate::rows::Cell;
+use crate::fields::in_parts;
+use crate::rows::{Cell, Finder};
 use crate::sets::Sets;
 
 use super::level::{FaceKind, Level, Stresses};
@@ -75,6 +76,12 @@ const STIFFER: f32 = 1e3;
 /// Stiff parts that are treated, the largest first: each costs six products with the matrix.
 const MOST_STIFF: usize = 16;
 
+/// Faces that one thread looks at.
+const FACES: usize = 4096;
+
+/// Pieces that one thread goes through.
+const PIECES: usize = 32;
+
 /// Share of the viscosity below which a resistance is rounding.
 const ROUNDING: f64 = 1e-12;
 
@@ -105,8 +112,8 @@ impl RigidMotions {
     pub(super) fn remove(&self, level: &Level, b: &mut FaceFields<f64>) {
         for component in &self.0 {
             let shares = component.inverse * component.lacking(level, b, None);
-            component.for_each_motion(&shares, |axis, at, motion| {
-                b[axis][at] -= f64::from(level.mass[axis][at]) * motion;
+            component.for_each_motion(&shares, b, |axis, at, b, motion| {
+                *b -= f64::from(level.mass[axis][at]) * motion;
             });
             for (axis, at, row) in &component.resistance {
                 b[*axis][*at] -= shares.dot(&Vector6::from(*row));
@@ -118,7 +125,7 @@ impl RigidMotions {
     pub(super) fn complete(&self, level: &Level, b: &FaceFields<f64>, z: &mut FaceFields<f64>) {
         for component in &self.0 {
             let shares = component.inverse * component.lacking(level, b, Some(z));
-            component.for_each_motion(&shares, |axis, at, motion| z[axis][at] += motion);
+            component.for_each_motion(&shares, z, |_, _, z, motion| *z += motion);
         }
     }
 }
@@ -167,7 +174,8 @@ impl Component {
 
     /// Fills `resistance`; returns that of the six motions against each other.
     fn resist(&mut self, level: &Level, is_stiff: bool, stresses: &mut Stresses<f64>) -> Matrix6<f64> {
-        let touches_solid = |piece: &Piece| touches_solid(level, piece);
+        let cells = Finder::new(level.rows());
+        let touches_solid = |piece: &Piece| touches_solid(level, &cells, piece);
         if !is_stiff && !self.pieces.iter().any(touches_solid) {
             return Matrix6::zeros();
         }
@@ -186,23 +194,31 @@ impl Component {
                 let mut force = zero();
                 level.apply(u, stresses, &mut force);
                 for axis in 0..3 {
-                    for at in 0..len {
-                        force[axis][at] -= f64::from(level.mass[axis][at]) * u[axis][at];
-                    }
+                    in_parts(&mut force[axis], |first, part| {
+                        for (at, force) in (first..).zip(part) {
+                            *force -= f64::from(level.mass[axis][at]) * u[axis][at];
+                        }
+                    });
                 }
                 force
             })
             .collect();
         let mut sum = Matrix6::zeros();
         for axis in 0..3 {
-            for at in 0..len {
-                let row: [f64; 6] = std::array::from_fn(|motion| forces[motion][axis][at]);
+            let row_of = |at: usize| {
                 let inverse = f64::from(level.inverse_diagonal[axis][at]);
-                if row.iter().any(|force| force.abs() * inverse > ROUNDING) {
-                    self.resistance.push((axis, at, row));
-                    let here = Vector6::from_fn(|motion, _| motions[motion][axis][at]);
-                    sum += here * Vector6::from(row).transpose();
-                }
+                let row: [f64; 6] = std::array::from_fn(|motion| forces[motion][axis][at]);
+                let is_resisted = row.iter().any(|force| force.abs() * inverse > ROUNDING);
+                is_resisted.then_some((at, row))
+            };
+            let starts = (0..len).step_by(FACES);
+            let rows = parallel::map(starts, |_, first| {
+                (first..len.min(first + FACES)).filter_map(row_of).collect::<Vec<_>>()
+            });
+            for (at, row) in rows.into_iter().flatten() {
+                self.resistance.push((axis, at, row));
+                let here = Vector6::from_fn(|motion, _| motions[motion][axis][at]);
+                sum += here * Vector6::from(row).transpose();
             }
         }
         (sum + sum.transpose()) * 0.5
@@ -220,7 +236,7 @@ impl Component {
             }
             Vector6::from(sum)
         };
-        let sums = parallel::tabulate(self.pieces.len(), 16, |n| of_piece(&self.pieces[n]));
+        let sums = parallel::tabulate(self.pieces.len(), PIECES, |n| of_piece(&self.pieces[n]));
         let mut lack: Vector6<f64> = sums.iter().sum();
         if let Some(z) = z {
             for (axis, at, row) in &self.resistance {
@@ -230,22 +246,41 @@ impl Component {
         lack
     }
 
-    /// Calls `f` with each face and its velocity in a mix of the six motions.
-    fn for_each_motion(&self, shares: &Vector6<f64>, mut f: impl FnMut(usize, usize, f64)) {
-        for piece in &self.pieces {
-            for n in 0..piece.len {
-                let motions = Vector6::from(piece.motions(n, self.about));
-                f(piece.axis, piece.at + n, shares.dot(&motions));
+    /// Calls `f` with each face, its value in a field, and its velocity in a mix of the six motions. In parallel.
+    fn for_each_motion(
+        &self,
+        shares: &Vector6<f64>,
+        field: &mut FaceFields<f64>,
+        f: impl Fn(usize, usize, &mut f64, f64) + Sync,
+    ) {
+        let mut rest = field.each_mut().map(|field| (0, &mut field[..]));
+        // Pieces of an axis ascend.
+        let mut part = |piece: &Piece| {
+            let (first, rest) = &mut rest[piece.axis];
+            let skipped = piece.at - *first;
+            *first = piece.at + piece.len;
+            rest.split_off_mut(..skipped + piece.len).map(|part| &mut part[skipped..]).unwrap_or_default()
+        };
+        let parts: Vec<_> = self.pieces.iter().map(|piece| (piece, part(piece))).collect();
+        let mut parts = parts.into_iter();
+        let groups =
+            std::iter::from_fn(|| Some(parts.by_ref().take(PIECES).collect::<Vec<_>>()).filter(|g| !g.is_empty()));
+        parallel::for_each(groups, |_, group| {
+            for (piece, values) in group {
+                for (n, value) in values.iter_mut().enumerate() {
+                    let motions = Vector6::from(piece.motions(n, self.about));
+                    f(piece.axis, piece.at + n, value, shares.dot(&motions));
+                }
             }
-        }
+        });
     }
 }
 
-fn touches_solid(level: &Level, piece: &Piece) -> bool {
+fn touches_solid(level: &Level, cells: &Finder<'_>, piece: &Piece) -> bool {
     (-1..=piece.len as i32).any(|n| {
         [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]].into_iter().any(|[dy, dz]| {
             let cell = [piece.cell[0] + n, piece.cell[1] + dy, piece.cell[2] + dz];
-            level.rows().find(cell).is_none_or(|at| (0..3).any(|axis| level.kinds[axis][at] == FaceKind::Solid))
+            cells.find(cell).is_none_or(|at| (0..3).any(|axis| level.kinds[axis][at] == FaceKind::Solid))
         })
     })
 }

@@ -1,7 +1,7 @@
 //! From a grid of liquid to the matrix of its viscosity.
 
 use crate::pressure::PressureSolver;
-use crate::rows::{Cell, CellRows, Periods};
+use crate::rows::{Cell, CellRows, Finder, Periods};
 use crate::stencil::Stencil;
 
 use super::StokesGrid;
@@ -56,28 +56,29 @@ pub(super) fn set_up(grid: &StokesGrid<'_>, pressure: &PressureSolver) -> (Level
         kinds: FaceFields::default(),
     };
     let active = grid.periods.gathered(pressure.stencil().active().grown_up());
-    fields.kinds = rows.tabulate_each(|cell| match rows.find(cell) {
-        Some(at) => [0, 1, 2].map(|axis| fields.kind(cell, at, axis)),
-        None => [FaceKind::Solid; 3],
-    });
+    let finder = || Finder::new(rows);
+    fields.kinds =
+        rows.tabulate_with(finder, |finder, cell, at| [0, 1, 2].map(|axis| fields.kind(finder, cell, at, axis)));
     images.fill_each(&mut fields.kinds);
-    let shares = fields.on_active(&active, Fields::share, 0.0);
-    let mass: FaceFields<f32> = std::array::from_fn(|axis| {
-        let faces = active.tabulate(|cell| match rows.find(cell) {
-            Some(at) if fields.kinds[axis][at] == FaceKind::Free => {
-                shares[axis][at] * fields.density_at(cell, at, axis)
-            }
-            _ => 0.0,
-        });
-        rows.resampled(&active, &faces, 0.0)
+    let filled = rows.tabulate_with(finder, |finder, cell, at| {
+        [if pressure.is_liquid(at) { fields.filled(finder, cell, at) } else { 0.0 }]
     });
+    let [filled] = filled;
+    let share =
+        |fields: &Fields<'_>, finder: &Finder<'_>, cell, at, axis| fields.share(&filled, finder, cell, at, axis);
+    let shares = fields.on_active(&active, share, 0.0);
+    let mass = |fields: &Fields<'_>, finder: &Finder<'_>, cell: Cell, at: usize, axis: usize| {
+        let is_free = fields.kinds[axis][at] == FaceKind::Free;
+        if is_free { shares[axis][at] * fields.density_at(finder, cell, at, axis) } else { 0.0 }
+    };
+    let mass = fields.on_active(&active, mass, 0.0);
     let distances = pressure.surface_distances();
     let gradient: FaceFields<f32> = std::array::from_fn(|axis| {
         shares[axis].iter().zip(&distances[axis]).map(|(share, distance)| share / distance).collect()
     });
     let normal =
         (0..rows.len()).map(|at| if pressure.is_liquid(at) { 2.0 * fields.viscosity[at] } else { 0.0 }).collect();
-    let shear = fields.on_active(&active, |fields, cell, _, axis| fields.shear(cell, axis), 0.0);
+    let shear = fields.on_active(&active, |fields, finder, cell, _, axis| fields.shear(finder, cell, axis), 0.0);
     let Fields { kinds, open, .. } = fields;
     let stencil = Stencil::within(rows.clone(), active);
     let liquid = (0..rows.len()).map(|at| pressure.is_liquid(at)).collect();
@@ -100,38 +101,39 @@ impl Fields<'_> {
     fn on_active<T: Copy + Default + Send + Sync>(
         &self,
         active: &CellRows,
-        value: impl Fn(&Self, Cell, usize, usize) -> T + Sync,
+        value: impl Fn(&Self, &Finder<'_>, Cell, usize, usize) -> T + Sync,
         outside: T,
     ) -> FaceFields<T> {
-        let faces: FaceFields<T> = active.tabulate_each(|cell| match self.rows.find(cell) {
-            Some(at) => [0, 1, 2].map(|axis| value(self, cell, at, axis)),
+        let finder = || Finder::new(self.rows);
+        let faces: FaceFields<T> = active.tabulate_with(finder, |finder, cell, _| match finder.find(cell) {
+            Some(at) => [0, 1, 2].map(|axis| value(self, finder, cell, at, axis)),
             None => [outside; 3],
         });
         faces.map(|faces| self.rows.resampled(active, &faces, outside))
     }
 
-    fn below(&self, cell: Cell, axis: usize) -> Option<usize> {
-        self.rows.find(lower(cell, axis))
-    }
-
-    fn kind(&self, cell: Cell, at: usize, axis: usize) -> FaceKind {
+    fn kind(&self, finder: &Finder<'_>, cell: Cell, at: usize, axis: usize) -> FaceKind {
         if self.open[axis][at] == 0.0 {
             return FaceKind::Solid;
         }
         let is_liquid = |at: usize| self.pressure.is_liquid(at);
-        if is_liquid(at) || self.below(cell, axis).is_some_and(is_liquid) { FaceKind::Free } else { FaceKind::Air }
+        if is_liquid(at) || finder.find(lower(cell, axis)).is_some_and(is_liquid) {
+            FaceKind::Free
+        } else {
+            FaceKind::Air
+        }
     }
 
     /// The share of a free face's volume that is liquid: between the centres of the cells beside it, or from the centre of
-    /// the liquid one to the surface.
-    fn share(&self, cell: Cell, at: usize, axis: usize) -> f32 {
+    /// the liquid one to the surface. `filled`: see [`Self::filled`].
+    fn share(&self, filled: &[f32], finder: &Finder<'_>, cell: Cell, at: usize, axis: usize) -> f32 {
         if self.kinds[axis][at] != FaceKind::Free {
             return 0.0;
         }
         let open = self.open[axis][at];
-        match self.below(cell, axis) {
+        match finder.find(lower(cell, axis)) {
             Some(below) if self.pressure.is_liquid(at) && self.pressure.is_liquid(below) => {
-                open * 0.5 * (self.filled(cell, at) + self.filled(lower(cell, axis), below))
+                open * 0.5 * (filled[at] + filled[below])
             }
             _ => open * self.pressure.surface_distances()[axis][at],
         }
@@ -139,14 +141,14 @@ impl Fields<'_> {
 
     /// The liquid of a cell, as a share of a cell's volume, with what reaches beyond it into air; exact where the surface
     /// is along the grid. Air behind closed faces does not count: cells beyond walls are such.
-    fn filled(&self, cell: Cell, at: usize) -> f32 {
+    fn filled(&self, finder: &Finder<'_>, cell: Cell, at: usize) -> f32 {
         let distances = self.pressure.surface_distances();
         let mut reach = f32::INFINITY;
         for axis in 0..3 {
             let mut above = cell;
             above[axis] += 1;
-            let above = self.rows.find(above);
-            for (face, air) in [(Some(at), self.below(cell, axis)), (above, above)] {
+            let above = finder.find(above);
+            for (face, air) in [(Some(at), finder.find(lower(cell, axis))), (above, above)] {
                 let (Some(face), Some(air)) = (face, air) else { continue };
                 if self.open[axis][face] > 0.0 && self.pressure.is_air(air) {
                     reach = reach.min(distances[axis][face]);
@@ -157,9 +159,9 @@ impl Fields<'_> {
         if reach < f32::INFINITY { (0.5 + reach.min(-self.level_set[at])).clamp(0.5, 1.5) } else { 1.0 }
     }
 
-    fn density_at(&self, cell: Cell, at: usize, axis: usize) -> f32 {
+    fn density_at(&self, finder: &Finder<'_>, cell: Cell, at: usize, axis: usize) -> f32 {
         let is_liquid = |at: &usize| self.pressure.is_liquid(*at);
-        match (self.below(cell, axis).filter(is_liquid), Some(at).filter(is_liquid)) {
+        match (finder.find(lower(cell, axis)).filter(is_liquid), Some(at).filter(is_liquid)) {
             (Some(a), Some(b)) => 0.5 * (self.density[a] + self.density[b]),
             (Some(one), None) | (None, Some(one)) => self.density[one],
             (None, None) => 1.0,
@@ -169,10 +171,10 @@ impl Fields<'_> {
     /// The viscosity of the edge along `axis` at the low corner of a cell: the harmonic mean of the liquid around it, as
     /// shear stress is the same on both sides of a jump. 0 where one of the four faces at the edge is in air: the
     /// surface has no shear stress. Air behind closed faces does not count. Beside a solid the velocity falls to the solid's over less than a cell.
-    fn shear(&self, cell: Cell, axis: usize) -> f32 {
+    fn shear(&self, finder: &Finder<'_>, cell: Cell, axis: usize) -> f32 {
         let (side, other) = ((axis + 1) % 3, (axis + 2) % 3);
         let (mut inverse, mut liquid, mut air) = (0.0, 0.0, 0.0);
-        let is_open = |face: usize, cell: Cell| self.rows.find(cell).is_some_and(|at| self.open[face][at] > 0.0);
+        let is_open = |face: usize, cell: Cell| finder.find(cell).is_some_and(|at| self.open[face][at] > 0.0);
         let across_side = [cell, lower(cell, other)].map(|cell| is_open(side, cell));
         let across_other = [cell, lower(cell, side)].map(|cell| is_open(other, cell));
         let corners = [
@@ -182,7 +184,7 @@ impl Fields<'_> {
             (lower(lower(cell, side), other), across_side[1] || across_other[1]),
         ];
         for (corner, is_reached) in corners {
-            let Some(at) = self.rows.find(corner) else { continue };
+            let Some(at) = finder.find(corner) else { continue };
             if self.pressure.is_liquid(at) {
                 if self.viscosity[at] <= 0.0 {
                     return 0.0;
@@ -196,7 +198,7 @@ impl Fields<'_> {
         let mut distance = 1.0_f32;
         let mut held: Option<f32> = None;
         for (face, step) in [(side, other), (other, side)] {
-            let pair = [Some(cell), Some(lower(cell, step))].map(|cell| cell.and_then(|cell| self.rows.find(cell)));
+            let pair = [Some(cell), Some(lower(cell, step))].map(|cell| cell.and_then(|cell| finder.find(cell)));
             let kinds = pair.map(|at| at.map_or(FaceKind::Solid, |at| self.kinds[face][at]));
             if kinds.contains(&FaceKind::Air) {
                 return 0.0;

@@ -93,7 +93,7 @@ impl Pieces {
     }
 
     /// The piece of which a cell, stored at `at`, holds some: its own, or that of the deepest cell that shares a face with it.
-    pub(super) fn holding(&self, view: PhiView<'_>, finder: &mut Finder<'_>, cell: Cell, at: usize) -> Option<u32> {
+    pub(super) fn holding(&self, view: PhiView<'_>, finder: &Finder<'_>, cell: Cell, at: usize) -> Option<u32> {
         if view.phi[at] >= HOLDS || !contains(view, cell) {
             return None;
         }
