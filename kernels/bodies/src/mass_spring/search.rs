@@ -131,6 +131,7 @@ impl StageSolver {
             self.store_noncontact_residual(stage);
             self.use_linearised_forces(stage);
             if !self.direction(context, stage, asked, cached, x, &mut solved) {
+                self.watch_thin(context, x);
                 break;
             }
             self.volumes.predict(context.body, &self.dx);
