@@ -25,7 +25,7 @@ pub(super) struct DropBins {
 
 impl DropBins {
     pub(super) fn new(spray: &[SprayDrop]) -> Self {
-        let bin = |drop: &SprayDrop| (drop.phase, along_zyx(drop).map(|at| number(at)));
+        let bin = |drop: &SprayDrop| (drop.phase, along_zyx(drop).map(number));
         let mut drops: Vec<_> = spray.iter().enumerate().map(|(n, drop)| (bin(drop), n)).collect();
         drops.sort_unstable();
         let mut volume = vec![0.0];

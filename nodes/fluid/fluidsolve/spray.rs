@@ -268,7 +268,7 @@ mod tests {
         let any = |n: u64| {
             let place = [0, 1, 2].map(|k| 24.0 * random(n, k) - 2.0);
             // A few are larger than the distance up to which drops gather.
-            let volume = f64::from(random(n, 3).powi(40) * 60.0);
+            let volume = f64::from((0..40).fold(60.0, |volume, _| volume * random(n, 3)));
             SprayDrop { volume, phase: (random(n, 4) * 2.0) as u32, ..drop(place, [0.0; 3]) }
         };
         let spray: Vec<SprayDrop> = (0..3000).map(any).collect();

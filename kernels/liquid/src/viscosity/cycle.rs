@@ -39,10 +39,10 @@ impl Multigrid {
     /// `is_light`: mass outweighs viscosity everywhere, so that no error is too smooth for the smoother.
     pub(super) fn new(finest: Level, is_light: bool) -> Self {
         let mut levels = vec![finest];
-        while !is_light {
+        loop {
             let fine = &levels[levels.len() - 1];
             let cells = fine.stencil.active().len();
-            if cells <= COARSEST {
+            if is_light || cells <= COARSEST {
                 break;
             }
             let Some(coarse) = coarsened(fine) else { break };

@@ -86,7 +86,7 @@ fn largest_difference(a: &FaceFields<f64>, b: &FaceFields<f64>) -> f64 {
 /// rounding alone. (Pressure answers its centrifugal force in the next step.)
 #[test]
 fn rigid_motions_are_kept_whatever_the_viscosity() {
-    for viscosity in [1.0, 1e4, 1e9] {
+    for viscosity in [LIGHT, 1.0, 1e4, 1e9] {
         let solver = Case::ball(20, viscosity).solver();
         let turning = |[x, y, z]: [f64; 3]| {
             [0.05 * (z - 10.0) - 0.02 * (y - 10.0), 0.02 * (x - 10.0) - 0.4, -0.05 * (x - 10.0) + 0.1]
@@ -131,6 +131,27 @@ fn nearly_rigid_liquid_turns_noise_into_rigid_motion() {
     let strained = (0..3).flat_map(|axis| product[axis].iter().zip(&u[axis]).zip(&level.mass[axis]));
     let force = strained.map(|((product, u), mass)| (product - u * f64::from(*mass)).abs()).fold(0.0, f64::max);
     assert!(force < 1.0, "{force}");
+}
+
+/// What is solved for by smoothing alone has the same velocity, in about as many iterations, as what is solved for by multigrid.
+#[test]
+fn light_liquid_goes_over_into_viscous_liquid() {
+    let free = |p: [f32; 3]| length(sub(p, [12.0; 3])) - 7.9;
+    let on_floor = |p: [f32; 3]| p[1] - 9.3 - 0.2 * p[0];
+    let shapes: [&(dyn Fn([f32; 3]) -> f32 + Sync); 2] = [&free, &on_floor];
+    for shape in shapes {
+        let solved = [LIGHT, 1.0001 * LIGHT].map(|viscosity| {
+            let solver = Case::new([24; 3], viscosity, shape).solver();
+            assert_eq!(solver.viscous.grids().len() == 1, viscosity <= LIGHT);
+            let mut u = velocity(&solver, noise);
+            let solved = solve(&solver, &mut u, 1e-7);
+            assert!(solved.velocity <= 1e-7 && solved.flow <= 1e-7, "{solved:?}");
+            (u, solved.iterations)
+        });
+        let [(light, few), (viscous, more)] = solved;
+        assert!(largest_difference(&light, &viscous) < 1e-4, "{}", largest_difference(&light, &viscous));
+        assert!(few <= more + more / 4, "{few} {more}");
+    }
 }
 
 /// Taylor–Green vortices in a full box with free-slip walls decay by the grid's own wave number: a step divides them by
