@@ -397,7 +397,11 @@ fn what_goes_wrong_with_a_soft_body_is_noted() {
     let late = [r#""frame": 6"#, r#""frame": 6, "start_frame": 6"#];
     only(&[late], "`later` (Softbody_Goal): `late_start` is 1 at frame 1", "Set `start_frame` before `frame`.");
     let never = [r#""frame": 6, "strength": 1e4"#, r#""frame": 6, "strength": 0"#];
-    only(&[never], "`later` (Softbody_Goal): `idle` is 1 at frame 1", "Raise `strength`, or remove the goal.");
+    only(
+        &[never],
+        "`later` (Softbody_Goal): `idle` is 1 at frame 1",
+        "Raise `strength`, paint its mask, or remove the goal.",
+    );
     let late = [r#""frame": 6"#, r#""frame": 60"#];
     let text = "`frame` is 60, after the last frame of the scene, whose frames are 1-6. ";
     only(&[late], &format!("`later` (Softbody_Goal): {text}"), "extend `scene.frames`");
