@@ -74,13 +74,21 @@ fn refusals_and_what_nodes_could_not_meet_have_their_messages() {
 
 #[test]
 fn what_takes_longer_than_the_limit_is_stopped_and_said() {
-    let bench = Bench::with_graph(BLADE);
-    let args = ["study", "g.json", "--extremes", "--frames", "1-1000000", "--limit", "300ms", "--json", "-", "--quiet"];
-    // Noise of sixteen octaves on each of a million frames.
-    let found = bench.json(&[&args[..], &["--set", "wind.noise=perlin"]].concat());
-    let octaves = row(&found, "wind.octaves", &json!(16));
-    assert_eq!(octaves["outcome"], "capped", "{octaves}");
-    assert!(octaves["message"].as_str().unwrap().contains("in 0.3 s"), "{octaves}");
+    let bench = Bench::with_graph(&BLADE.replace(r#""grass": "wind""#, r#""grass": "blade""#));
+    let args = ["study", "g.json", "--extremes", "--frames", "1-1000000", "--json", "-", "--quiet"];
+    let found = bench.json(&[&args[..], &["--limit", "300ms"]].concat());
+    let scale = row(&found, "blade.scale", &json!(1e9));
+    assert_eq!(scale["outcome"], "capped", "{scale}");
+    assert!(scale["message"].as_str().unwrap().contains("in 0.3 s"), "{scale}");
+}
+
+/// Its process is ended before it listens to signals.
+#[test]
+fn a_limit_too_short_to_start_within_is_said() {
+    let args = ["study", "g.json", "--extremes", "--limit", "0.001ms"];
+    let ended = Bench::with_graph(BLADE).run(&args);
+    assert_eq!(ended.code, Some(4), "{}", ended.stderr);
+    assert!(ended.stderr.contains("no frame in 1e-6 s; set a longer --limit"), "{}", ended.stderr);
 }
 
 #[test]

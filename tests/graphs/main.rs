@@ -8,7 +8,7 @@
 mod bits;
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::thread;
 
@@ -23,14 +23,32 @@ fn last(graph: &Graph) -> i64 {
     if has_solver(graph) { scene.last.min(scene.first + 4) } else { scene.last }
 }
 
+/// Cooks an example in each of these ways, and returns the lines of its bits.
+fn cook_in_all_ways(path: &Path) -> String {
+    let graph = load(path);
+    assert!(Engine::new(&Settings::default()).unwrap().verify(&graph, None).is_empty(), "{}", path.display());
+    let frames = frames(&graph, last(&graph));
+    let folder = tempfile::tempdir().unwrap();
+    let cached = |state: &str| {
+        let mut cache = DiskCache::open(folder.path(), u64::MAX);
+        (cook(&graph, &frames, 2, Some(&mut cache)), format!("{}: {state} cache", path.display()))
+    };
+    let (expected, _) = cached("cold");
+    let (warm, what) = cached("warm");
+    assert_eq!(warm, expected, "{what}");
+    let reversed: Vec<Frame> = frames.iter().rev().copied().collect();
+    assert_eq!(cook(&graph, &reversed, 1, None), expected, "{}: reversed, 1 thread", path.display());
+    let last = [frames[2]];
+    let alone: Keys =
+        expected.iter().filter(|((_, frame), _)| *frame == last[0]).map(|(at, key)| (at.clone(), *key)).collect();
+    assert_eq!(cook(&graph, &last, 7, None), alone, "{}: the last frame alone, 7 threads", path.display());
+    lines(path, &expected)
+}
+
 #[test]
-fn every_example_has_the_stored_bits() {
-    let mut text = String::new();
-    for path in graphs() {
-        let graph = load(&path);
-        assert!(Engine::new(&Settings::default()).unwrap().verify(&graph, None).is_empty(), "{}", path.display());
-        text += &lines(&path, &cook(&graph, &frames(&graph, last(&graph)), 0, None));
-    }
+fn every_example_has_the_stored_bits_however_it_is_cooked() {
+    let texts = two_at_a_time(&graphs(), cook_in_all_ways);
+    let text = texts.concat();
     let stored = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/graphs.txt");
     if std::env::var_os("BLESS").is_some() {
         fs::write(&stored, &text).unwrap();
@@ -42,38 +60,20 @@ fn every_example_has_the_stored_bits() {
     );
 }
 
-/// Checks all examples, two at a time.
-fn for_each_graph(check: impl Fn(&Path) + Sync) {
-    let left = Mutex::new(graphs().into_iter());
+/// What `cook` returns for each of `paths`, in their order.
+fn two_at_a_time(paths: &[PathBuf], cook: impl Fn(&Path) -> String + Sync) -> Vec<String> {
+    let left = Mutex::new(paths.iter().enumerate());
+    let cooked = Mutex::new(vec![String::new(); paths.len()]);
     let next = || left.lock().unwrap().next();
     thread::scope(|scope| {
         for _ in 0..2 {
             scope.spawn(|| {
-                while let Some(path) = next() {
-                    check(&path);
+                while let Some((index, path)) = next() {
+                    let text = cook(path);
+                    cooked.lock().unwrap()[index] = text;
                 }
             });
         }
     });
-}
-
-#[test]
-fn bits_do_not_depend_on_threads_order_or_cache() {
-    for_each_graph(|path| {
-        let graph = load(path);
-        let frames = frames(&graph, last(&graph));
-        let expected = cook(&graph, &frames, 2, None);
-        let reversed: Vec<Frame> = frames.iter().rev().copied().collect();
-        assert_eq!(cook(&graph, &reversed, 1, None), expected, "{}: reversed, 1 thread", path.display());
-        assert_eq!(cook(&graph, &frames, 7, None), expected, "{}: 7 threads", path.display());
-        let last = [frames[2]];
-        let alone: Keys =
-            expected.iter().filter(|((_, frame), _)| *frame == last[0]).map(|(at, key)| (at.clone(), *key)).collect();
-        assert_eq!(cook(&graph, &last, 2, None), alone, "{}: the last frame alone", path.display());
-        let folder = tempfile::tempdir().unwrap();
-        for state in ["cold", "warm"] {
-            let mut cache = DiskCache::open(folder.path(), u64::MAX);
-            assert_eq!(cook(&graph, &frames, 2, Some(&mut cache)), expected, "{}: {state} cache", path.display());
-        }
-    });
+    cooked.into_inner().unwrap()
 }

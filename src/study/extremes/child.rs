@@ -20,8 +20,8 @@ const GRACE: Duration = Duration::from_secs(5);
 /// How a child ended.
 pub(super) enum Ended {
     Probed(Probed),
-    /// It had to be killed: it did not stop when it was asked to.
-    Killed,
+    /// It was asked to stop and returned nothing: it did not listen in time, or not yet.
+    Silenced,
     /// It crashed: what its last line says, or how it ended.
     Crashed(String),
     /// Ctrl-C.
@@ -51,12 +51,12 @@ pub(super) fn run(
         let stderr = scope.spawn(|| text(stderr.map(Pipe::Err)));
         let waited = wait(&mut child, limit, cancel).map_err(failed);
         let [stdout, stderr] = [stdout, stderr].map(|reader| reader.join().unwrap_or_default());
-        let (status, killed) = waited?;
+        let (status, silenced) = waited?;
         if cancel.load(Ordering::Relaxed) {
             return Ok(Ended::Interrupted);
         }
-        if killed {
-            return Ok(Ended::Killed);
+        if silenced {
+            return Ok(Ended::Silenced);
         }
         Ok(Probed::of_json(&stdout).map_or_else(|| Ended::Crashed(last_words(&stderr, status)), Ended::Probed))
     })
@@ -79,13 +79,13 @@ fn text(pipe: Option<Pipe>) -> Vec<u8> {
     bytes
 }
 
-/// Waits for its end; whether it was killed.
+/// Waits for its end, and whether a signal ended it that it was sent because of `limit` or `cancel`.
 fn wait(child: &mut Child, limit: Duration, cancel: &AtomicBool) -> std::io::Result<(ExitStatus, bool)> {
     let watch = Stopwatch::start();
     let mut asked_at = None;
     loop {
         if let Some(status) = child.try_wait()? {
-            return Ok((status, false));
+            return Ok((status, asked_at.is_some() && is_ended_by_asking(status)));
         }
         let now = watch.wall();
         match asked_at {
@@ -108,9 +108,21 @@ fn ask_to_stop(child: &mut Child) -> std::io::Result<()> {
     Ok(rustix::process::kill_process(pid, rustix::process::Signal::TERM)?)
 }
 
+/// Whether the signal of [`ask_to_stop`] ended it: it came before the child listened for it.
+#[cfg(unix)]
+fn is_ended_by_asking(status: ExitStatus) -> bool {
+    use std::os::unix::process::ExitStatusExt as _;
+    status.signal() == Some(rustix::process::Signal::TERM.as_raw())
+}
+
 #[cfg(not(unix))]
 fn ask_to_stop(child: &mut Child) -> std::io::Result<()> {
     child.kill()
+}
+
+#[cfg(not(unix))]
+fn is_ended_by_asking(_: ExitStatus) -> bool {
+    true
 }
 
 fn last_words(stderr: &[u8], status: ExitStatus) -> String {

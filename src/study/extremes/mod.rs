@@ -114,7 +114,7 @@ pub(super) fn run(args: &StudyArgs) -> Result<(), Failure> {
     let as_it_is = match cook("")? {
         Ended::Probed(probed) => probed,
         Ended::Interrupted => return Err(interrupted(0)),
-        Ended::Killed => return Err(Failure::new(Exit::Cook, too_slow(limit))),
+        Ended::Silenced => return Err(Failure::new(Exit::Cook, too_slow(limit))),
         Ended::Crashed(line) => return Err(Failure::new(Exit::Cook, line)),
     };
     if let Some(why) = as_it_is.failed.as_ref().or(as_it_is.refused.as_ref()) {
@@ -195,7 +195,7 @@ fn row(key: &str, value: &str, ended: Ended, as_it_is: &Probed, limit: Duration)
     };
     let (outcome, message, probed) = match ended {
         Ended::Crashed(line) => (Outcome::Failed, line, Probed::default()),
-        Ended::Killed | Ended::Interrupted => (Outcome::Capped, too_slow(limit), Probed::default()),
+        Ended::Silenced | Ended::Interrupted => (Outcome::Capped, too_slow(limit), Probed::default()),
         Ended::Probed(probed) => {
             let (outcome, message) = match (&probed.failed, &probed.refused) {
                 (Some(why), _) => (Outcome::Failed, why.clone()),
