@@ -125,7 +125,7 @@ impl Subject {
             Cook::Pure(_) => &[1.0],
             Cook::Frame { .. } => &[1.0, 2.5, 30.0],
             Cook::Window(..) => &[1.0, 3.0, 12.0],
-            Cook::Solver(..) => &[1.0, 2.0, 4.0],
+            Cook::Solver(..) => &[1.0, 2.0, 3.0],
         };
         frames.iter().map(|frame| Frame::exactly(*frame).expect("a frame")).collect()
     }

@@ -16,12 +16,27 @@ fn holds(tet: [[f64; 3]; 4], p: &[f64; 3]) -> bool {
 
 /// How many points of `inner` lie in tets of `body`.
 fn inside(body: &[[f64; 3]], tets: &[[u32; 4]], inner: &[[f64; 3]]) -> usize {
-    let corners: Vec<[[f64; 3]; 4]> = tets.iter().map(|tet| tet.map(|corner| body[corner as usize])).collect();
-    inner.iter().filter(|p| corners.iter().any(|tet| near(tet, p) && holds(*tet, p))).count()
-}
-
-fn near(tet: &[[f64; 3]; 4], p: &[f64; 3]) -> bool {
-    (0..3).all(|k| tet.iter().any(|corner| corner[k] <= p[k]) && tet.iter().any(|corner| corner[k] >= p[k]))
+    let boxed = |tet: &[u32; 4]| {
+        let corners = tet.map(|corner| body[corner as usize]);
+        let side = |pick: fn(f64, f64) -> f64| -> [f64; 3] {
+            std::array::from_fn(|k| corners.iter().map(|corner| corner[k]).reduce(pick).unwrap())
+        };
+        (side(f64::min), side(f64::max), corners)
+    };
+    let boxed: Vec<_> = tets.iter().map(boxed).collect();
+    let is_inside = |p: &[f64; 3]| {
+        for (low, high, corners) in &boxed {
+            // Written out: the test is compiled without optimisation, and most tets end here.
+            if p[0] < low[0] || p[0] > high[0] || p[1] < low[1] || p[1] > high[1] || p[2] < low[2] || p[2] > high[2] {
+                continue;
+            }
+            if holds(*corners, p) {
+                return true;
+            }
+        }
+        false
+    };
+    inner.iter().filter(|p| is_inside(p)).count()
 }
 
 #[test]

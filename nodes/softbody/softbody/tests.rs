@@ -77,13 +77,13 @@ fn with_inside(wire: usize, given: Geometry) -> Geometry {
     block.into()
 }
 
-/// The same, pressed flat: the first body at frame 2, others at frame 4, from frame 2 on where samples have
+/// The same, pressed flat: the first body at frame 2, others at frame 3, from frame 2 on where samples have
 /// `goal_start`.
 fn pressed(wire: usize, given: Geometry) -> Geometry {
     let mut geometry = with_inside(wire, given.clone());
     if let Some(tets) = geometry.part_mut(Kind::Tets).filter(|tets| tets.point_count() > 0) {
         tets.edit(P).unwrap().iter_mut().for_each(|p| *p = [1.3 * p[0], 0.6 * p[1], 1.3 * p[2]]);
-        let frame = if wire == 0 { 2.0 } else { 4.0 };
+        let frame = if wire == 0 { 2.0 } else { 3.0 };
         for (attribute, value) in [(GOAL_FRAME, frame), (GOAL_STRENGTH, 2000.0), (GOAL_HOLD, 0.0)] {
             tets.set(attribute, vec![value]).unwrap();
         }
