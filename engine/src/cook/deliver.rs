@@ -1,19 +1,26 @@
 //! From a node's result to what an output asks for: attributes picked, velocities added.
 
+use std::sync::Arc;
+
 use crate::error::{Error, Result};
 use crate::geometry::{CURVE_ID, Component, Geometry, ID, Name, Owner, P, V};
 use crate::graph::GraphOutput;
 
-/// What an output delivers of `geometry`; `around` are the results before and after with the seconds between
-/// them, where velocities are differences.
-pub(super) fn finish(
-    output: &GraphOutput,
-    geometry: &Geometry,
-    around: Option<([&Geometry; 2], f64)>,
-) -> Result<Geometry> {
+/// The results that velocities are differences of.
+pub(super) struct Around {
+    /// Before and after.
+    pub(super) results: [Arc<Geometry>; 2],
+    /// Seconds between them.
+    pub(super) seconds: f64,
+    /// They come from a solver: a whole frame away, and what has velocities has the solver's.
+    pub(super) of_solver: bool,
+}
+
+/// What an output delivers of `geometry`.
+pub(super) fn finish(output: &GraphOutput, geometry: &Geometry, around: Option<&Around>) -> Result<Geometry> {
     let mut result = geometry.clone();
-    if let Some((around, seconds)) = around {
-        add_velocity(&mut result, around, seconds)?;
+    if let Some(around) = around {
+        add_velocity(&mut result, around)?;
     }
     let kinds: Vec<_> = result.parts().map(|part| part.kind()).collect();
     for kind in kinds {
@@ -39,25 +46,29 @@ fn wanted(output: &GraphOutput, name: &Name) -> bool {
     }
 }
 
-fn add_velocity(result: &mut Geometry, [before, after]: [&Geometry; 2], seconds: f64) -> Result<()> {
+fn add_velocity(result: &mut Geometry, around: &Around) -> Result<()> {
+    let [before, after] = &around.results;
+    let away = if around.of_solver { "a frame" } else { "half a frame" };
     let kinds: Vec<_> = result.parts().map(|part| part.kind()).collect();
     for kind in kinds {
-        let Some(part) = result.part_mut(kind) else { continue };
+        let Some(part) = result.part_mut(kind).filter(|part| !around.of_solver || part.get(V).is_none()) else {
+            continue;
+        };
         let (before, after) = match (before.part(kind), after.part(kind)) {
             (Some(before), Some(after)) if stays(before, part) && stays(part, after) => (before, after),
             (before, after) => {
                 let counts = [before, after].map(|part| part.map_or(0, |part| part.point_count()));
                 let now = part.point_count();
                 let fact = match counts {
-                    [a, b] if a == now && b == now => format!("the {kind} are not the same half a frame away"),
-                    [a, b] => format!("the {kind} have {a} points half a frame before, {now} now and {b} after"),
+                    [a, b] if a == now && b == now => format!("the {kind} are not the same {away} away"),
+                    [a, b] => format!("the {kind} have {a} points {away} before, {now} now and {b} after"),
                 };
                 return Err(Error::refused(fact)
                     .hint("velocities need the same points at neighbouring frames; remove `v` from the output"));
             }
         };
         let (a, b) = (before.positions(), after.positions());
-        let rate = 1.0 / seconds;
+        let rate = 1.0 / around.seconds;
         let v =
             a.iter().zip(b).map(|(a, b)| std::array::from_fn(|k| ((f64::from(b[k]) - f64::from(a[k])) * rate) as f32));
         part.set(V, v.collect())?;

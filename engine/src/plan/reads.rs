@@ -185,7 +185,8 @@ impl<'g> Plan<'g> {
     }
 
     /// The results that a delivered frame of an output is made of. Velocities that the node does not write itself are
-    /// the difference over half a frame each way, one-sided at the scene's ends.
+    /// the difference over half a frame each way, or a whole one where it comes from a solver, which has no others;
+    /// one-sided at the scene's ends.
     pub(crate) fn delivery(&self, output: usize, frame: Frame) -> DeliveryReads {
         let scene = &self.graph.scene;
         let from = self.graph.outputs[output].from;
@@ -203,10 +204,10 @@ impl<'g> Plan<'g> {
         let node = output.from.node;
         let writes_v = |node: &Node| node.writes.iter().any(|attribute| attribute.spec().0 == V.name);
         let own = self.graph.nodes[node].node().is_some_and(writes_v);
-        let differs = output.v && !own && !self.nodes[node].has_solver;
-        differs.then(|| {
-            let before = if frame == scene.start() { frame } else { frame.plus_ticks(-HALF) };
-            let after = if frame == scene.end() && frame != scene.start() { frame } else { frame.plus_ticks(HALF) };
+        let ticks = if self.nodes[node].has_solver { Frame::TICKS } else { HALF };
+        (output.v && !own).then(|| {
+            let before = if frame == scene.start() { frame } else { frame.plus_ticks(-ticks) };
+            let after = if frame == scene.end() && frame != scene.start() { frame } else { frame.plus_ticks(ticks) };
             [before, after]
         })
     }

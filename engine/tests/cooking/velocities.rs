@@ -3,7 +3,7 @@
 use engine::geometry::{Geometry, ID, Kind, V};
 
 use crate::builder::{Cooked, TestGraph, at, engine, row};
-use crate::nodes::{ADD, CLOCK, FOLLOW, SOURCE};
+use crate::nodes::{ADD, BOUNCE, CLOCK, FOLLOW, SOURCE};
 
 /// x = f².
 fn squares() -> TestGraph {
@@ -55,6 +55,29 @@ fn velocities_do_not_depend_on_which_frames_are_requested() {
     for frame in [1.0, 2.0, 5.0, 9.0, 10.0] {
         let alone = graph.cook_with(&engine(1, 1 << 30), &[at(frame)], None);
         assert_eq!(v(&alone, frame).to_bits(), v(&together, frame).to_bits(), "frame {frame}");
+    }
+}
+
+/// Symplectic Euler: x = 10 − g dt² n(n + 1)/2 after n steps, whose difference over two frames is −g dt (n + ½).
+#[test]
+fn what_comes_from_a_solver_has_the_difference_over_whole_frames() {
+    for downstream in [false, true] {
+        let mut graph = TestGraph::new(1, 25);
+        let a = graph.add("a", &SOURCE).set("amount", 10.0_f32).done();
+        let mut last = graph.add("bounce", &BOUNCE).set("samples", 1_i64).wire("points", a).done();
+        if downstream {
+            last = graph.add("add", &ADD).wire("points", last).done();
+        }
+        graph.output(last).v = true;
+        let cooked = graph.cook(2..=24);
+        for frame in 2..=24 {
+            let exact = -9.81 / 24.0 * (f64::from(frame) - 0.5);
+            let found = f64::from(v(&cooked, f64::from(frame)));
+            assert!((found - exact).abs() < 1e-3, "frame {frame}: {found} for {exact}");
+        }
+        let end = graph.cook([25]);
+        let one_sided = f64::from(end.x(25.0)) - f64::from(graph.cook([24]).x(24.0));
+        assert!((f64::from(v(&end, 25.0)) - 24.0 * one_sided).abs() < 1e-3);
     }
 }
 

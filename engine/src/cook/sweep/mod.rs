@@ -372,13 +372,13 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
     fn delivered(&self, output: usize, frame: Frame) -> Result<Arc<Geometry>, Arc<CookError>> {
         let reads = self.plan.delivery(output, frame);
         let geometry = self.geometry(reads.now)?;
-        let around = match reads.around {
-            None => None,
-            Some(([before, after], seconds)) => Some(([self.geometry(before)?, self.geometry(after)?], seconds)),
-        };
-        let around = around.as_ref().map(|([before, after], seconds)| ([&**before, &**after], *seconds));
         let output = &self.plan.graph.outputs[output];
-        let finished = deliver::finish(output, &geometry, around);
+        let of_solver = self.plan.nodes[output.from.node].has_solver;
+        let around = reads.around.map(|(results, seconds)| -> Result<_, Arc<CookError>> {
+            let [before, after] = results.map(|read| self.geometry(read));
+            Ok(deliver::Around { results: [before?, after?], seconds, of_solver })
+        });
+        let finished = deliver::finish(output, &geometry, around.transpose()?.as_ref());
         finished.map(Arc::new).map_err(|error| Arc::new(self.plan.error(output.from.node, frame, error)))
     }
 

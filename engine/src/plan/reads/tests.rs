@@ -275,7 +275,7 @@ fn samples_follow_the_params_of_the_frame_and_refused_ones_are_an_error() {
 }
 
 #[test]
-fn a_delivered_frame_reads_half_a_frame_each_way_where_its_velocity_is_a_difference() {
+fn a_delivered_frame_reads_half_a_frame_each_way_where_its_velocity_is_a_difference_and_a_whole_one_of_a_solver() {
     let mut net = Net::new();
     let solver = net.add("solver", &SOLVER, &[&[1]]);
     let plan = net.plan();
@@ -286,7 +286,9 @@ fn a_delivered_frame_reads_half_a_frame_each_way_where_its_velocity_is_a_differe
     assert_eq!(read(1, 5.0), [5.0, 4.5, 5.5].map(at));
     assert_eq!(read(1, 10.0), [10.0, 9.5, 10.0].map(at));
     assert_eq!(read(0, 5.0), [1.0; 3].map(at));
-    assert_eq!(read(solver, 5.0), [5.0].map(at));
+    assert_eq!(read(solver, 5.0), [5.0, 4.0, 6.0].map(at));
+    assert_eq!(read(solver, 1.0), [1.0, 1.0, 2.0].map(at));
+    assert_eq!(read(solver, 10.0), [10.0, 9.0, 10.0].map(at));
     let seconds = plan.delivery(1, at(5.0)).around.map(|(_, seconds)| seconds * plan.graph.scene.fps);
     assert!(seconds.is_some_and(|frames| (frames - 1.0).abs() < 1e-12), "{seconds:?}");
     assert_eq!(plan.measured_frames(1, 0, at(5.0)), [5.0, 4.5, 5.5].map(at));
