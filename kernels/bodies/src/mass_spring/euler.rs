@@ -94,17 +94,7 @@ impl Stepper<'_> {
         let scale = self.scale(&motion.x, &y, contacts, h);
         let mut enough = StopCriteria { share: EULER_SHARE, scale, square: 0.0, first: 0.0 };
         let mut solved = Solved::default();
-        let stage = Stage {
-            y: &y,
-            z: &z,
-            a: h,
-            time: times[1],
-            contacts: &[],
-            early: 0.0,
-            rotational_energy: &[],
-            line_search: true,
-            index: 0,
-        };
+        let stage = Stage { y: &y, z: &z, a: h, time: times[1], line_search: true, ..Stage::default() };
         let before = OnceCell::new();
         for round in 1..=MOST_ROUNDS {
             let again = self.solver.descend(&self.context, &stage, contacts, enough, self.cached, &mut x);

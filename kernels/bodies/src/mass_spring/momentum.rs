@@ -225,7 +225,7 @@ impl StageSolver {
         for contact in stage.contacts {
             let state = contact.at(x, &v, stage.early, body.size);
             if state.mode != ContactMode::Open {
-                contact.sides().for_each(|(particle, weight)| forces[particle] += state.force * weight);
+                contact.push(state.force, &mut forces);
             }
         }
         forces

@@ -228,9 +228,7 @@ impl StageSolver {
     fn store_noncontact_residual(&mut self, stage: &Stage<'_>) {
         self.noncontact_residual.clone_from(&self.r);
         for (contact, state) in stage.contacts.iter().zip(&self.contact_states) {
-            for (particle, weight) in contact.sides().filter(|side| !self.system.held[side.0]) {
-                self.noncontact_residual[particle] -= state.force * (weight * stage.a * stage.a);
-            }
+            contact.push(state.force * (-stage.a * stage.a), &mut self.noncontact_residual);
         }
     }
 
