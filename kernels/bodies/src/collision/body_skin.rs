@@ -108,14 +108,14 @@ impl BodySkin {
         self.rest.len()
     }
 
-    /// Whether a contact point rides along on particles.
-    pub(super) fn rides(&self, point: u32) -> bool {
-        point as usize >= self.particles
-    }
-
-    /// Surface particles within two links of one of them, itself included; the particles that a riding point rides on.
-    pub(super) fn around(&self, particle: u32) -> &[u32] {
-        &self.rings[self.starts[particle as usize] as usize..self.starts[particle as usize + 1] as usize]
+    /// Whether one of the `others` is within two links of one of these points of the surface. Points that ride along are as
+    /// near as what they ride on.
+    pub(super) fn is_near(&self, points: &[u32], others: &[u32]) -> bool {
+        let around =
+            |point: u32| &self.rings[self.starts[point as usize] as usize..self.starts[point as usize + 1] as usize];
+        let knows = |other: &u32| points.iter().any(|point| around(*point).binary_search(other).is_ok());
+        let rides = |other: u32| other as usize >= self.particles;
+        others.iter().any(|other| if rides(*other) { around(*other).iter().any(knows) } else { knows(other) })
     }
 
     /// Distance of a particle from a triangle at rest, metres.

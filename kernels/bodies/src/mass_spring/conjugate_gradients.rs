@@ -57,22 +57,17 @@ impl<'a> Coarse<'a> {
         Self { factor: &cached.factor, offset_from_centroid, filters: &cached.filters }
     }
 
-    /// Solves for the rigid motions `modes` of the clusters under `forces`; returns forcesᵀ·(PᵀAP)⁻¹·forces.
-    fn solve(&self, forces: &[[f64; 6]], modes: &mut Vec<f64>) -> f64 {
-        modes.clear();
-        if self.factor.is_empty() {
-            return 0.0;
-        }
-        modes.extend(forces.iter().flatten());
-        self.factor.solve(Path::chosen(), modes);
-        forces.iter().flatten().zip(modes).fold(0.0, |sum, (force, mode)| sum + force * *mode)
-    }
-
     /// The squared residual in the preconditioner's norm, from the squares and the forces of all clusters; sets the rigid
-    /// motions `modes`.
+    /// motions `modes` of the clusters under these forces.
     fn squared_norm(&self, of_clusters: Vec<(f64, [f64; 6])>, modes: &mut Vec<f64>) -> f64 {
         let (squares, forces): (Vec<f64>, Vec<[f64; 6]>) = of_clusters.into_iter().unzip();
-        squares.iter().sum::<f64>() + self.solve(&forces, modes)
+        modes.clear();
+        if !self.factor.is_empty() {
+            modes.extend(forces.iter().flatten());
+            self.factor.solve(Path::chosen(), modes);
+        }
+        let work = forces.iter().flatten().zip(modes).fold(0.0, |sum, (force, mode)| sum + force * *mode);
+        squares.iter().sum::<f64>() + work
     }
 
     /// Displacement of a particle by the rigid motion of its cluster.

@@ -210,9 +210,9 @@ impl StageSolver {
     ) -> Solved {
         self.begin(context, stage.contacts);
         let mut solved = self.iterate(context, stage, newton, cached, x);
-        if let Some((corrected, r)) = self.corrected_angular_momentum(context, stage, x) {
+        if let Some(corrected) = self.corrected_angular_momentum(context.body, stage, x) {
             x.copy_from_slice(&corrected);
-            self.r = r;
+            self.assemble(context, stage, x, false);
             if !solved.failed {
                 solved.set_residual(self.square(&context.body.order.clusters));
             }
@@ -428,7 +428,7 @@ mod tests {
                 solver.solve(&context, &stage, Newton { most: 1, tolerance: 0.0 }, &mut cached, &mut x)
             };
             solver.assemble(&context, &stage, &x, false);
-            assert!(solver.corrected_angular_momentum(&context, &stage, &x).is_some(), "nothing holds the block");
+            assert!(solver.corrected_angular_momentum(&body, &stage, &x).is_some(), "nothing holds the block");
             let residual = (solver.square(&body.order.clusters) / solved.first).sqrt();
             assert!(residual > 0.0 && !solved.failed, "{solved:?}");
             let off = (solved.residual / residual - 1.0).abs();

@@ -44,17 +44,8 @@ struct StageEnd {
 impl<'a> Step<'a> {
     /// The equation of one of the stages.
     fn stage<'b>(&'b self, y: &'b [DVec3], z: &'b [DVec3], time: f64, early: f64, index: usize) -> Stage<'b> {
-        Stage {
-            y,
-            z,
-            a: self.a,
-            time,
-            contacts: self.contacts,
-            early,
-            rotational_energy: &self.rotational_energy,
-            line_search: false,
-            index,
-        }
+        let (a, contacts, rotational_energy) = (self.a, self.contacts, &self.rotational_energy[..]);
+        Stage { y, z, a, time, contacts, early, rotational_energy, index, ..Stage::default() }
     }
 }
 
