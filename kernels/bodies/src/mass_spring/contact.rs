@@ -99,14 +99,14 @@ pub(super) struct ContactConstraint {
     pub(super) point_weights: [f64; 4],
     /// The particles that these depend on, each once, and their weights; and how many there are, in all and of the first
     /// surface.
-    particles: [u32; MOST_PARTICLES],
+    pub(super) particles: [u32; MOST_PARTICLES],
     weights: [f64; MOST_PARTICLES],
     counts: [usize; 2],
     pub(super) normal: DVec3,
     offset: f64,
     gap: f64,
     pub(super) velocity: DVec3,
-    friction: f64,
+    pub(super) friction: f64,
     jammed: bool,
     /// Penalty stiffness κ, N/m.
     penalty_stiffness: f64,
@@ -225,11 +225,6 @@ impl ContactConstraint {
         self.particles[..count].iter().zip(&self.weights).map(|(particle, weight)| (*particle as usize, *weight))
     }
 
-    /// The first of its particles.
-    pub(super) fn first_particle(&self) -> usize {
-        self.particles[0] as usize
-    }
-
     /// The particles of the first surface, and of the second if that is a body's.
     pub(super) fn surfaces(&self) -> [&[u32]; 2] {
         self.particles[..self.counts[0]].split_at(self.counts[1]).into()
@@ -244,11 +239,6 @@ impl ContactConstraint {
     /// Whether it is between bodies: the sum of its weights is 0 there, and 1 with an obstacle.
     pub(super) fn is_two_sided(&self) -> bool {
         self.point_weights.iter().sum::<f64>().abs() < 0.5
-    }
-
-    /// Whether slip is resisted.
-    pub(super) fn has_friction(&self) -> bool {
-        self.friction > 0.0
     }
 
     /// Whether it is closed at `x` although the obstacle leaves no room there.

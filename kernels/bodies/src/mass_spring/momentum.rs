@@ -51,7 +51,7 @@ impl StageSolver {
         }
         let mut links = Vec::new();
         for contact in contacts {
-            let first = piece_of(contact.first_particle());
+            let first = piece_of(contact.particles[0] as usize);
             for (particle, _) in contact.sides() {
                 touched[piece_of(particle) as usize] = true;
                 links.push([first, piece_of(particle)]);
@@ -85,7 +85,7 @@ impl StageSolver {
         let known = stage.contacts.iter().zip(&self.contact_states).zip(&self.friction_duals).enumerate();
         let obstacle_contacts = known.filter(|known| known.1.0.1.mode != ContactMode::Open).filter_map(
             |(index, ((contact, state), dual))| {
-                let piece = self.layout.piece_of(contact.first_particle());
+                let piece = self.layout.piece_of(contact.particles[0] as usize);
                 let group = self.groups[piece].filter(|_| !contact.is_two_sided())? as usize;
                 Some(ObstacleContact {
                     group,
