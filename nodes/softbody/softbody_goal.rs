@@ -64,10 +64,10 @@ metrics! { METRICS:
         .warn_above(0.0, "The goal starts to pull only when the body should already have its shape, so the body is \
             pulled there at once, or not at all where `hold` is over by then. Set `start_frame` before `frame`.");
     SHAPE_ERROR = Metric::new("shape_error", Unit::None,
-        "Largest distance from the shape at which the tets hold a mesh that rides along, relative to the size of the shape; \
-         0 where the shape is that of the tets' own surface.")
-        .warn_above(0.02, "The tets are too coarse for this shape: the mesh that rides along stays this share of its size \
-            away from it. Lower `spacing` of Tetrahedralize.");
+        "The largest distance of the mesh that rides along from the shape, relative to the size of the shape. 0 without \
+         such a mesh: the surface of the tets takes the shape exactly.")
+        .warn_above(0.02, "The mesh that rides along does not reach the shape, because the tets that carry it are too \
+            coarse. Lower `spacing` of Tetrahedralize.");
     CG = Metric::new("cg", Unit::None, "Iterations of conjugate gradients in the solve for the interior.");
     RESIDUAL = Metric::new("residual", Unit::None,
         "Force left on inner points after the solve, relative to the force exerted by the surface.");
@@ -82,8 +82,8 @@ pub(crate) static NODE: Node = Node::new(
     3,
     "Turns a target shape of a body's surface into a goal for the whole body: the interior follows as if it were \
      elastic. Wire it into `goals` of Softbody, and the body reaches the shape at the frame set here. The shape must \
-     have the points and faces of the body's surface. Where a mesh rides along in the tets, as in a cage, it must have \
-     those of that mesh; the tets bring it as near to the shape as they can, which `shape_error` says.",
+     have the points and faces of the mesh that comes with the body: its surface, or a mesh that rides along in the tets, \
+     as in a cage. The tets bring a mesh that rides along as near to the shape as they can; `shape_error` says how near.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)
@@ -149,9 +149,14 @@ fn held<'a>(body: &'a Component, mesh: Option<&'a Component>, shape: &Component)
         owned.contains(&false)
     };
     let fact = match mesh {
-        Some(mesh) if mesh.topology() != shape.topology() || mesh.point_count() != shape.point_count() => {
-            let of = if points == 0 { "the mesh that rides along in" } else { "the surface of" };
-            format!("`shape` has {}, {of} `body` {}, or their topology differs", counted(shape), counted(mesh))
+        Some(mesh) if counted(mesh) != counted(shape) => {
+            format!("`shape` has {}, but the mesh that comes with `body` has {}", counted(shape), counted(mesh))
+        }
+        Some(mesh) if mesh.topology() != shape.topology() => {
+            format!(
+                "the faces of `shape` join its {} points otherwise than those of the mesh that comes with `body`",
+                mesh.point_count()
+            )
         }
         Some(mesh) if points > mesh.point_count() => {
             format!("`{name}` of `body` goes up to {}, but its surface has {} points", points - 1, mesh.point_count())
@@ -167,7 +172,7 @@ fn held<'a>(body: &'a Component, mesh: Option<&'a Component>, shape: &Component)
             ));
         }
         None if points != shape.point_count() => {
-            format!("`shape` has {} points, the surface of `body` {points}", shape.point_count())
+            format!("`shape` has {} points, but the surface of `body` has {points}", shape.point_count())
         }
         _ => return Ok(Held::Surface(rows)),
     };

@@ -99,13 +99,11 @@ fn a_shape_of_another_surface_is_refused_with_both_counts() {
     let other = mesh(&shapes::sphere([1.0; 3], 4));
     let own = format!("{} faces and {} points", ball().element_count(), ball().point_count());
     let (faces, points) = (other.element_count(), other.point_count());
-    let fact = format!(
-        "`shape` has {faces} faces and {points} points, the surface of `body` {own}, or their topology differs"
-    );
+    let fact = format!("`shape` has {faces} faces and {points} points, but the mesh that comes with `body` has {own}");
     assert_eq!(refused(body(), other.clone()), fact);
     let mut alone = body();
     alone.remove(Kind::Mesh);
-    let fact = format!("`shape` has {points} points, the surface of `body` {}", ball().point_count());
+    let fact = format!("`shape` has {points} points, but the surface of `body` has {}", ball().point_count());
     assert_eq!(refused(alone.clone(), other), fact);
     assert!(making(alone, ball()).try_cook().is_ok());
 
@@ -114,10 +112,10 @@ fn a_shape_of_another_surface_is_refused_with_both_counts() {
     corners.swap(0, 1);
     flipped = Component::mesh(flipped.faces().unwrap().runs.counts().collect(), corners, flipped.positions().to_vec())
         .unwrap();
-    assert_eq!(
-        refused(body(), flipped),
-        format!("`shape` has {own}, the surface of `body` {own}, or their topology differs")
-    );
+    let points = ball().point_count();
+    let fact =
+        "join its {} points otherwise than those of the mesh that comes with `body`".replace("{}", &points.to_string());
+    assert_eq!(refused(body(), flipped), format!("the faces of `shape` {fact}"));
 }
 
 #[test]
@@ -216,5 +214,5 @@ fn a_caged_body_takes_the_shape_of_the_mesh_that_rides_along() {
 fn a_shape_of_another_mesh_than_the_one_that_rides_along_is_refused() {
     let other = mesh(&shapes::sphere([1.0; 3], 4));
     let fact = making(caged(), other).try_cook().unwrap_err().fact;
-    assert!(fact.contains("the mesh that rides along in `body`"), "{fact}");
+    assert!(fact.contains("but the mesh that comes with `body` has"), "{fact}");
 }

@@ -51,12 +51,9 @@ impl StageSolver {
                     self.transient_forces[*corner as usize] += gradient * thin.pressure;
                 }
             }
-            for (contact, state) in
-                stage.contacts.iter().zip(&self.contact_states).filter(|pair| pair.1.mode != ContactMode::Open)
-            {
-                for (particle, weight) in contact.sides() {
-                    self.transient_forces[particle] += state.force * weight;
-                }
+            let known = stage.contacts.iter().zip(&self.contact_states);
+            for (contact, state) in known.filter(|known| known.1.mode != ContactMode::Open) {
+                contact.push(state.force, &mut self.transient_forces);
             }
         }
     }
@@ -111,8 +108,8 @@ impl StageSolver {
         });
     }
 
-    /// The residual `r` at positions `x` with velocities `v`, and the linear system there, whose rank-one terms and blocks are
-    /// set already.
+    /// The residual `r` at positions `x` with velocities `v`, and the linear system there, whose rank-one terms are set
+    /// already.
     fn assemble_system(
         &mut self,
         context: &FrameContext<'_>,
@@ -123,7 +120,7 @@ impl StageSolver {
         let (body, a) = (context.body, stage.a);
         let clusters = &body.order.clusters;
         let mut system = std::mem::take(&mut self.system);
-        let (held, blocks, regions, transient) = (&system.held, &system.blocks, &system.regions, &system.transient);
+        let (held, regions, transient) = (&system.held, &system.regions, &system.transient);
         let per_particle = (
             r,
             &mut system.inertia[..],
@@ -151,9 +148,6 @@ impl StageSolver {
                 if !transient.is_empty() {
                     transient.add_block(particle, 1.0, usize::MAX, &mut block);
                 }
-                if let Some(other) = blocks.get(particle) {
-                    block.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
-                }
                 *inertia = mass + context.external.inertia(particle, mass, a);
                 [0, 3, 5].iter().for_each(|diagonal| block[*diagonal] += *inertia);
                 sums.forces[particle - first] = if held[particle] {
@@ -175,7 +169,6 @@ impl StageSolver {
             let weights = self.volumes.weights(a);
             self.system.regions.set(&weights, &self.volumes.gradients, clusters);
         }
-        self.system.blocks.clear();
         self.system.anchors = self.thin_tets.len();
         let (mut starts, mut particles, mut along) = (vec![0u32], Vec::new(), Vec::new());
         for thin in &self.thin_tets {
@@ -190,15 +183,7 @@ impl StageSolver {
             if state.mode == ContactMode::Open || contact.is_two_sided() != two_sided {
                 continue;
             }
-            let resisted = contact.stiffness_directions(state, a, dual);
-            if let Some((particle, weight)) = contact.single_particle() {
-                if self.system.blocks.is_empty() {
-                    self.system.blocks.resize(body.len(), [0.0; 6]);
-                }
-                contact.add_block(&resisted, weight, &mut self.system.blocks[particle]);
-                continue;
-            }
-            let (directions, count) = resisted;
+            let (directions, count) = contact.stiffness_directions(state, a, dual);
             for direction in &directions[..count] {
                 for (particle, weight) in contact.sides() {
                     particles.push(particle as u32);

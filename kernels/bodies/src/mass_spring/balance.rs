@@ -47,18 +47,7 @@ impl Stepper<'_> {
         let pins: Vec<usize> = external.moving_pins().collect();
         let mut by_pins = 0.0;
         if !pins.is_empty() {
-            let (y, z) = (&[][..], &[][..]);
-            let stage = Stage {
-                y,
-                z,
-                a: h,
-                time: times[1],
-                contacts,
-                early: 0.0,
-                rotational_energy: &[],
-                line_search: false,
-                index: 0,
-            };
+            let stage = Stage { a: h, time: times[1], contacts, ..Stage::default() };
             let force = self.solver.forces(&self.context, &stage, &motion.x, &motion.v);
             let reaction = |pin: usize| (motion.v[pin] - start.v[pin]) * (body.mass[pin] / h) - force[pin];
             by_pins = pins.into_iter().map(|pin| reaction(pin).dot(&moved(pin))).sum();

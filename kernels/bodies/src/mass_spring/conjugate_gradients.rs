@@ -57,22 +57,17 @@ impl<'a> Coarse<'a> {
         Self { factor: &cached.factor, offset_from_centroid, filters: &cached.filters }
     }
 
-    /// Solves for the rigid motions `modes` of the clusters under `forces`; returns forcesᵀ·(PᵀAP)⁻¹·forces.
-    fn solve(&self, forces: &[[f64; 6]], modes: &mut Vec<f64>) -> f64 {
-        modes.clear();
-        if self.factor.is_empty() {
-            return 0.0;
-        }
-        modes.extend(forces.iter().flatten());
-        self.factor.solve(Path::chosen(), modes);
-        forces.iter().flatten().zip(modes).fold(0.0, |sum, (force, mode)| sum + force * *mode)
-    }
-
     /// The squared residual in the preconditioner's norm, from the squares and the forces of all clusters; sets the rigid
-    /// motions `modes`.
+    /// motions `modes` of the clusters under these forces.
     fn squared_norm(&self, of_clusters: Vec<(f64, [f64; 6])>, modes: &mut Vec<f64>) -> f64 {
         let (squares, forces): (Vec<f64>, Vec<[f64; 6]>) = of_clusters.into_iter().unzip();
-        squares.iter().sum::<f64>() + self.solve(&forces, modes)
+        modes.clear();
+        if !self.factor.is_empty() {
+            modes.extend(forces.iter().flatten());
+            self.factor.solve(Path::chosen(), modes);
+        }
+        let work = forces.iter().flatten().zip(modes).fold(0.0, |sum, (force, mode)| sum + force * *mode);
+        squares.iter().sum::<f64>() + work
     }
 
     /// Displacement of a particle by the rigid motion of its cluster.
@@ -115,17 +110,7 @@ pub(super) fn solve(
     p.resize(r.len(), DVec3::zeros());
     ap.resize(r.len(), DVec3::zeros());
 
-    // Squared residual in the preconditioner's norm, and forces on clusters.
-    let smoother = &system.smoother;
-    let first = clusters.map((), |cluster, ()| {
-        let (mut square, mut sums) = (0.0, [0.0; 6]);
-        for particle in clusters.range(cluster) {
-            square += solve_lower(&smoother[particle], r[particle]).norm_squared();
-            coarse.restrict(particle, r[particle], &mut sums);
-        }
-        (square, sums)
-    });
-    let start = coarse.squared_norm(first, modes);
+    let start = squared_norm(system, body, coarse, r, modes);
     let mut reached = Reached { iterations: 0, share: 0.0, met: true };
     if !(start > f64::MIN_POSITIVE && start.is_finite()) {
         reached.met = start.is_finite();
@@ -194,24 +179,24 @@ fn update_direction(
     });
 }
 
-/// Replaces `r` by the preconditioner applied to it, an approximation of A⁻¹r.
-pub(super) fn precondition(system: &System, body: &SoftBody, coarse: Coarse<'_>, r: &mut [DVec3]) {
+/// The squared residual in the preconditioner's norm; sets the rigid motions `modes` of the clusters.
+fn squared_norm(system: &System, body: &SoftBody, coarse: Coarse<'_>, r: &[DVec3], modes: &mut Vec<f64>) -> f64 {
     let clusters = &body.order.clusters;
-    let forces = {
-        let r = &*r;
-        clusters.map((), |cluster, ()| {
-            let mut sums = [0.0; 6];
-            clusters.range(cluster).for_each(|particle| coarse.restrict(particle, r[particle], &mut sums));
-            sums
-        })
-    };
-    let mut modes = Vec::new();
-    coarse.solve(&forces, &mut modes);
-    clusters.for_each(r, |cluster, r: &mut [DVec3]| {
-        for (particle, r) in clusters.range(cluster).zip(r) {
-            let w = &system.smoother[particle];
-            let fine = solve_lower_transpose(w, solve_lower(w, *r));
-            *r = if system.held[particle] { DVec3::zeros() } else { fine + coarse.moved(&modes, cluster, particle) };
+    let of_clusters = clusters.map((), |cluster, ()| {
+        let (mut square, mut sums) = (0.0, [0.0; 6]);
+        for particle in clusters.range(cluster) {
+            square += solve_lower(&system.smoother[particle], r[particle]).norm_squared();
+            coarse.restrict(particle, r[particle], &mut sums);
         }
+        (square, sums)
     });
+    coarse.squared_norm(of_clusters, modes)
+}
+
+/// The preconditioner applied to `r`, an approximation of A⁻¹r.
+pub(super) fn precondition(system: &System, body: &SoftBody, coarse: Coarse<'_>, r: &[DVec3]) -> Vec<DVec3> {
+    let (mut modes, mut out) = (Vec::new(), vec![DVec3::zeros(); r.len()]);
+    squared_norm(system, body, coarse, r, &mut modes);
+    update_direction(system, body, coarse, &modes, r, 0.0, &mut out);
+    out
 }

@@ -9,7 +9,7 @@
 //! Limit: within a stage the surfaces of a contact are planes.
 
 use super::body::SoftBody;
-use numerics::rank_one::add_square;
+use super::volume::continued;
 use numerics::vector::DVec3;
 
 /// Penalty stiffness κ ÷ effective stiffness of the particles, springs and inertia together. Larger values keep the
@@ -92,21 +92,21 @@ pub trait ContactFinder: Sync {
 const MOST_PARTICLES: usize = 16;
 
 /// A contact as the solver treats it, with particles in the solver's order.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ContactConstraint {
     /// The contact points involved; those that ride along count on from the particles.
     pub(super) points: [u32; 4],
     pub(super) point_weights: [f64; 4],
     /// The particles that these depend on, each once, and their weights; and how many there are, in all and of the first
     /// surface.
-    particles: [u32; MOST_PARTICLES],
+    pub(super) particles: [u32; MOST_PARTICLES],
     weights: [f64; MOST_PARTICLES],
     counts: [usize; 2],
     pub(super) normal: DVec3,
     offset: f64,
     gap: f64,
     pub(super) velocity: DVec3,
-    friction: f64,
+    pub(super) friction: f64,
     jammed: bool,
     /// Penalty stiffness κ, N/m.
     penalty_stiffness: f64,
@@ -136,7 +136,7 @@ pub(super) enum ContactMode {
 }
 
 /// Forces of a contact at some positions.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ContactState {
     pub(super) mode: ContactMode,
     /// Force on the first surface, newtons.
@@ -163,22 +163,14 @@ impl ContactConstraint {
             return None;
         }
         let mut constraint = Self {
-            points: [0; 4],
             point_weights: contact.weights,
-            particles: [0; MOST_PARTICLES],
-            weights: [0.0; MOST_PARTICLES],
-            counts: [0; 2],
             normal,
             offset: contact.offset,
             gap: contact.gap.max(0.0),
             velocity: DVec3::from(contact.velocity),
             friction: contact.friction.max(0.0),
             jammed: contact.jammed,
-            penalty_stiffness: 0.0,
-            stick_limit: 0.0,
-            load: 0.0,
-            allowed_depth: 0.0,
-            frozen: None,
+            ..Self::default()
         };
         for k in 0..4 {
             if contact.weights[k] != 0.0 {
@@ -233,11 +225,6 @@ impl ContactConstraint {
         self.particles[..count].iter().zip(&self.weights).map(|(particle, weight)| (*particle as usize, *weight))
     }
 
-    /// The first of its particles.
-    pub(super) fn first_particle(&self) -> usize {
-        self.particles[0] as usize
-    }
-
     /// The particles of the first surface, and of the second if that is a body's.
     pub(super) fn surfaces(&self) -> [&[u32]; 2] {
         self.particles[..self.counts[0]].split_at(self.counts[1]).into()
@@ -252,11 +239,6 @@ impl ContactConstraint {
     /// Whether it is between bodies: the sum of its weights is 0 there, and 1 with an obstacle.
     pub(super) fn is_two_sided(&self) -> bool {
         self.point_weights.iter().sum::<f64>().abs() < 0.5
-    }
-
-    /// Whether slip is resisted.
-    pub(super) fn has_friction(&self) -> bool {
-        self.friction > 0.0
     }
 
     /// Whether it is closed at `x` although the obstacle leaves no room there.
@@ -290,11 +272,6 @@ impl ContactConstraint {
         (self.gap > 0.0 && after > most * self.gap && after > left).then_some(after - left)
     }
 
-    /// The particle and its weight, if the contact involves only one.
-    pub(super) fn single_particle(&self) -> Option<(usize, f64)> {
-        self.sides().next().filter(|_| self.counts[0] == 1)
-    }
-
     /// Whether it is that of a single point of a body.
     pub(super) fn is_of_one_point(&self) -> bool {
         self.point_weights.iter().filter(|weight| **weight != 0.0).count() == 1
@@ -310,6 +287,11 @@ impl ContactConstraint {
     /// Σ wᵢ·valuesᵢ.
     pub(super) fn weighted_sum(&self, values: &[DVec3]) -> DVec3 {
         self.sides().fold(DVec3::zeros(), |sum, (particle, weight)| sum + values[particle] * weight)
+    }
+
+    /// Adds a `force` on the first surface to those of its particles.
+    pub(super) fn push(&self, force: DVec3, forces: &mut [DVec3]) {
+        self.sides().for_each(|(particle, weight)| forces[particle] += force * weight);
     }
 
     /// Distance above the gap at `x`, `seconds` before the time the contact was detected for.
@@ -372,16 +354,7 @@ impl ContactConstraint {
             let grip = if then.mode == ContactMode::Sliding { 0.0 } else { then.grip };
             return ContactState { depth, normal_force: push, force, grip, ..then };
         }
-        let mut state = ContactState {
-            mode: ContactMode::Open,
-            force: DVec3::zeros(),
-            depth,
-            normal_force: 0.0,
-            slope: 0.0,
-            grip: 0.0,
-            slip: DVec3::zeros(),
-            energy: 0.0,
-        };
+        let mut state = ContactState { depth, ..ContactState::default() };
         if depth > 0.0 {
             state.mode = ContactMode::Frictionless;
             (state.normal_force, state.slope, state.energy) = self.penalty(depth);
@@ -442,12 +415,7 @@ impl ContactConstraint {
             let left = 1.0 - depth / gap;
             (k * depth / left, k / (left * left), k * gap * (-depth - gap * libm::log(left)))
         };
-        if depth <= edge {
-            return curved(depth);
-        }
-        let (push, slope, energy) = curved(edge);
-        let more = depth - edge;
-        (push + slope * more, slope, energy + push * more + 0.5 * slope * more * more)
+        if depth <= edge { curved(depth) } else { continued(curved(edge), depth - edge) }
     }
 
     /// Linearises the normal force at a predicted value instead of the current one, if that is smaller. Far into the
@@ -520,11 +488,6 @@ impl ContactConstraint {
         let turned = if slides { more - dual * state.slip.dot(&more) } else { more };
         let next = dual.lerp(&(state.slip + turned), share);
         next * (DUAL_SHRINK / next.norm().max(1.0))
-    }
-
-    /// Adds the stiffness of a single-particle contact to that particle's block.
-    pub(super) fn add_block(&self, resisted: &([DVec3; 3], usize), weight: f64, block: &mut [f64; 6]) {
-        resisted.0[..resisted.1].iter().for_each(|separation| add_square(block, *separation, weight * weight));
     }
 }
 

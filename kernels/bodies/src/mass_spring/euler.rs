@@ -9,7 +9,6 @@ use super::springs::distance;
 use super::stage::{Solved, Stage};
 use super::step::{Kinematics, Stepper, deepest, sum};
 use numerics::vector::DVec3;
-use std::cell::OnceCell;
 
 /// Rounds of contact detection in a step.
 const MOST_ROUNDS: u32 = 4;
@@ -70,11 +69,6 @@ impl Stepper<'_> {
         (found, missed)
     }
 
-    /// Depth of the deepest contact at `time`, metres below its gap.
-    fn depth(&self, motion: &Kinematics, time: f64) -> f64 {
-        deepest(&self.contacts(motion, &motion.x, [time; 2]), &motion.x)
-    }
-
     /// A step of implicit Euler; `damped` if it starts out of balance by more than its contacts. Returns the estimated
     /// errors of positions too.
     pub(super) fn euler(
@@ -94,30 +88,14 @@ impl Stepper<'_> {
         let scale = self.scale(&motion.x, &y, contacts, h);
         let mut enough = StopCriteria { share: EULER_SHARE, scale, square: 0.0, first: 0.0 };
         let mut solved = Solved::default();
-        let stage = Stage {
-            y: &y,
-            z: &z,
-            a: h,
-            time: times[1],
-            contacts: &[],
-            early: 0.0,
-            rotational_energy: &[],
-            line_search: true,
-            index: 0,
-        };
-        let before = OnceCell::new();
+        let stage = Stage { y: &y, z: &z, a: h, time: times[1], line_search: true, ..Stage::default() };
         for round in 1..=MOST_ROUNDS {
             let again = self.solver.descend(&self.context, &stage, contacts, enough, self.cached, &mut x);
             solved = Solved { residual: again.residual, ..sum(solved, again) };
             (enough.square, enough.first) = (solved.enough, solved.first);
             let (mut found, missed) = self.find_missed(contacts, motion, &x, times);
-            // Contacts that were deep before are being separated. A contact plane at the end of a step may report
-            // depth that was none before, as surfaces turn.
-            let sank = |c: &&ContactConstraint| {
-                let now = -c.clearance(&x, 0.0);
-                c.is_too_deep(&x)
-                    && (now > -c.clearance(&motion.x, h) || now > *before.get_or_init(|| self.depth(motion, times[0])))
-            };
+            // Contacts that were deep before are being separated.
+            let sank = |c: &&ContactConstraint| c.is_too_deep(&x) && c.clearance(&x, 0.0) < c.clearance(&motion.x, h);
             solved.unmet = found.iter().filter(sank).map(|c| -c.clearance(&x, 0.0)).fold(0.0, f64::max);
             solved.deepest = deepest(&found, &x);
             if round == MOST_ROUNDS || !missed {

@@ -27,8 +27,6 @@ pub struct Pin {
     pub between: [[f64; 3]; 2],
 }
 
-const NONE: u32 = u32::MAX;
-
 /// External forces of one frame, in the solver's order.
 #[derive(Clone, Debug)]
 pub(super) struct ExternalForces {
@@ -36,9 +34,8 @@ pub(super) struct ExternalForces {
     pub(super) drag: f64,
     /// Length of the frame, seconds.
     seconds: f64,
-    /// Index of each particle's goal; empty without goals.
-    goal_of: Vec<u32>,
-    goals: Vec<Track>,
+    /// The goal of each particle; empty without goals.
+    goals: Vec<Option<Track>>,
     pub(super) held: Vec<bool>,
     pins: Vec<(u32, [DVec3; 2])>,
 }
@@ -64,8 +61,7 @@ impl ExternalForces {
             gravity,
             drag,
             seconds,
-            goal_of: if goals.is_empty() { Vec::new() } else { vec![NONE; body.len()] },
-            goals: Vec::with_capacity(goals.len()),
+            goals: if goals.is_empty() { Vec::new() } else { vec![None; body.len()] },
             held: vec![false; body.len()],
             pins: Vec::with_capacity(pins.len()),
         };
@@ -76,11 +72,9 @@ impl ExternalForces {
                 strength: goal.strength,
                 damping: goal.damping.max(0.0),
             };
-            if external.goal_of[particle] == NONE {
-                external.goal_of[particle] = external.goals.len() as u32;
-                external.goals.push(track);
-            } else {
-                external.goals[external.goal_of[particle] as usize].join(&track);
+            match &mut external.goals[particle] {
+                Some(known) => known.join(&track),
+                slot => *slot = Some(track),
             }
         }
         for pin in pins {
@@ -95,7 +89,7 @@ impl ExternalForces {
     /// Whether a goal or pin moves, so that it can do work.
     pub(super) fn moves(&self) -> bool {
         let moves = |between: &[DVec3; 2]| between[0] != between[1];
-        self.pins.iter().any(|pin| moves(&pin.1)) || self.goals.iter().any(|goal| moves(&goal.between))
+        self.pins.iter().any(|pin| moves(&pin.1)) || self.goals.iter().flatten().any(|goal| moves(&goal.between))
     }
 
     /// Moves pinned particles to their positions at `time`, a fraction of the frame, and sets `z` so that (x − z)/a
@@ -164,7 +158,7 @@ impl ExternalForces {
 
     #[inline(always)]
     fn goal(&self, particle: usize) -> Option<&Track> {
-        self.goals.get(*self.goal_of.get(particle)? as usize)
+        self.goals.get(particle)?.as_ref()
     }
 
     fn velocity(&self, between: &[DVec3; 2]) -> DVec3 {

@@ -2,7 +2,7 @@
 
 use super::body::SoftBody;
 use super::contact::ContactFinder;
-use super::energy::{Energies, measure};
+use super::energy::{Energies, measure, worst_stretch};
 use super::external::{ExternalForces, GoalSpring, Pin};
 use super::springs::{self, RestLengths};
 use super::stage::{FrameContext, StageSolver};
@@ -11,8 +11,9 @@ use super::step::{Kinematics, Stepped, Stepper};
 use super::volume::{Inventory, Volumes};
 use numerics::vector::DVec3;
 
-/// Largest number of steps in a frame.
+/// Largest number of steps in a frame, and of parts into which a step is cut at once.
 const MOST_STEPS: u32 = 256;
+const MOST_PARTS: f64 = 16.0;
 
 /// Time integration.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -187,28 +188,35 @@ impl BodySolver {
         }
         let mut motion =
             Kinematics { x: vectors(&state.positions), v: vectors(&state.velocities), acceleration, loads };
-        let mut report = FrameReport::default();
         self.solver.inventory = Inventory::new(body, &motion.x, &state.volumes);
         self.solver.lengths.clear();
-        let mut energies = measure(&mut self.solver, &context, 0.0, &motion, false);
+        let before = measure(&mut self.solver, &context, 0.0, &motion, false);
         self.solver.lengths.clone_from(&self.solver.lengths_now);
-        let before = energies;
+        let mut stepper = Stepper {
+            solver: &mut self.solver,
+            context,
+            frame,
+            seconds,
+            tolerance: match frame.integrator {
+                Integrator::Accurate { tolerance } => Some(tolerance.max(1e-12) * body.size),
+                Integrator::Default | Integrator::Euler => None,
+            },
+            cached: &mut state.cached,
+            euler_steps_left: &mut state.euler_steps_left,
+            energy_budget: &mut state.energy_budget,
+            impacts: &mut state.impacts,
+            energies: before,
+            report: FrameReport::default(),
+        };
         if seconds > 0.0 && !body.is_empty() {
-            let mut stepper = Stepper {
-                solver: &mut self.solver,
-                context,
-                frame,
-                seconds,
-                cached: &mut state.cached,
-                euler_steps_left: &mut state.euler_steps_left,
-                energy_budget: &mut state.energy_budget,
-                impacts: &mut state.impacts,
-            };
-            run(&mut stepper, &mut motion, &mut energies, &mut report);
+            stepper.advance_in(frame.substeps.clamp(1, MOST_STEPS), &mut motion, [0.0, 1.0], f64::INFINITY);
         }
+        let (mut report, after) = (stepper.report, stepper.energies);
         (report.inverted_tets, report.volume_ratio) = (self.solver.inventory.inverted, self.solver.inventory.ratio);
-        describe(&mut report, &context, &energies, &motion);
-        report.lost_share = lost_share(report.energy_lost, [&before, &energies], body, gravity.norm() * seconds);
+        (report.kinetic, report.elastic) = (after.kinetic, after.springs);
+        (report.volume_energy, report.goal_energy) = (after.volumes, after.goals);
+        report.worst_stretch = worst_stretch(&context, &motion.x);
+        report.lost_share = lost_share(report.energy_lost, [&before, &after], body, gravity.norm() * seconds);
         state.acceleration.resize(body.len(), [0.0; 3]);
         state.loads.clear();
         state.loads.extend(body.contact_indices().map(|point| motion.loads[point]));
@@ -221,157 +229,105 @@ impl BodySolver {
     }
 }
 
-/// Takes the steps of a frame.
-fn run(stepper: &mut Stepper<'_>, motion: &mut Kinematics, energies: &mut Energies, report: &mut FrameReport) {
-    let accurate = match stepper.frame.integrator {
-        Integrator::Accurate { tolerance } => Some(tolerance.max(1e-12) * stepper.context.body.size),
-        Integrator::Default | Integrator::Euler => None,
-    };
-    if let (Some(tolerance), 0) = (accurate, stepper.frame.substeps) {
-        return adapt(stepper, motion, energies, report, tolerance);
+impl Stepper<'_> {
+    /// Takes equal parts of a step between `times`.
+    fn advance_in(&mut self, parts: u32, motion: &mut Kinematics, times: [f64; 2], deepest: f64) {
+        let at = |part: u32| times[0] + (times[1] - times[0]) * f64::from(part) / f64::from(parts);
+        for part in (0..parts).take_while(|_| !(self.frame.cancelled)()) {
+            self.advance(motion, [at(part), at(part + 1)], deepest);
+        }
     }
-    if stepper.frame.substeps == 0 {
-        return cut(stepper, motion, energies, report, [0.0, 1.0], f64::INFINITY);
+
+    /// Takes one step between `times`, or several parts of it: if contacts stay too deep, if it loses much of a bounce, or
+    /// if its estimated error is too large. Short steps are only cut further for deep contacts if that reduces the depth
+    /// below `deepest`, metres.
+    fn advance(&mut self, motion: &mut Kinematics, times: [f64; 2], deepest: f64) {
+        /// Largest depth after halving ÷ before for which another halving is worth while.
+        const HELPS: f64 = 0.9;
+        /// Steps longer than this fraction of the frame are always halved.
+        const SHORT: f64 = 1.0 / 16.0;
+        /// Newton iterations of a frame after which steps are accepted, so that the frame ends; by default, and with a
+        /// tolerance.
+        const MOST_NEWTON: [u32; 2] = [400, 4000];
+        let (start, turned) = (self.start(motion), self.solver.inventory.inverted > 0);
+        let stepped = self.step(motion, times);
+        self.report.newton += stepped.solved.newton;
+        self.report.cg += stepped.solved.cg;
+        let (share, unmet) = (times[1] - times[0], stepped.solved.unmet);
+        let allowed = self.tolerance.map_or(f64::INFINITY, |tolerance| tolerance * share);
+        let (wanted, mut parts) = match self.tolerance {
+            Some(_) => (1, accurate_parts(&stepped, allowed)),
+            None => self.parts_of_impact(&stepped, turned),
+        };
+        let no_help = share <= SHORT && unmet > HELPS * deepest;
+        if (unmet > 0.0 || stepped.solved.failed) && !no_help {
+            parts = parts.max(2);
+        }
+        let shortest = share <= 1.0 / f64::from(MOST_STEPS);
+        let is_over = self.report.newton >= MOST_NEWTON[usize::from(self.tolerance.is_some())] || shortest;
+        if self.frame.substeps > 0 || (self.frame.cancelled)() || is_over || parts < 2 {
+            self.report.uncut_impacts += u32::from(wanted > 1 && !shortest);
+            self.report.tolerance_missed += u32::from(stepped.estimate > allowed);
+            return self.accept(&stepped);
+        }
+        self.restart(start, motion);
+        let parts = parts.min((share * f64::from(MOST_STEPS)) as u32).max(2);
+        let deepest = if unmet > 0.0 { unmet } else { deepest };
+        self.advance_in(parts, motion, times, deepest);
     }
-    let steps = stepper.frame.substeps.min(MOST_STEPS);
-    for step in (0..steps).take_while(|_| !(stepper.frame.cancelled)()) {
-        let times = [f64::from(step) / f64::from(steps), f64::from(step + 1) / f64::from(steps)];
-        let stepped = stepper.step(motion, times, energies, accurate);
-        accept(stepper, report, energies, &stepped);
-        let allowed = accurate.map_or(f64::INFINITY, |tolerance| tolerance * (times[1] - times[0]));
-        report.tolerance_missed += u32::from(stepped.estimate > allowed);
+
+    /// The number of parts that a step has to be cut into so that an impact keeps its bounce, and how many of them the
+    /// frame can still pay for. `turned` if it started with inverted tetrahedra.
+    fn parts_of_impact(&self, stepped: &Stepped, turned: bool) -> (u32, u32) {
+        /// Relative error of the speed of a body in contact.
+        const IMPACT_ERROR: f64 = 0.1;
+        /// Energy ÷ (E × volume) above which a body is crushed.
+        const CRUSHED: f64 = 10.0;
+        /// Newton iterations of a frame after which steps are no longer cut for that.
+        const MOST_NEWTON: u32 = 350;
+        let frame = self.frame;
+        // What is crushed, or starts out of balance, does not bounce.
+        let crushed = self.energies.scale() > CRUSHED * self.context.body.modulus_times_volume();
+        let bounces = frame.integrator == Integrator::Default
+            && frame.bounce.is_none_or(|bounce| bounce > 0.0 && bounce.is_finite())
+            && !(frame.substeps > 0 || frame.force_implicit_euler || turned || crushed || stepped.jammed > 0);
+        let wanted = if bounces { (stepped.impact_error / IMPACT_ERROR).clamp(1.0, MOST_PARTS) } else { 1.0 };
+        let wanted = (wanted.ceil() as u32).next_power_of_two();
+        // As if a part cost what the whole did.
+        let left = MOST_NEWTON.saturating_sub(self.report.newton) / stepped.solved.newton.max(1);
+        (wanted, wanted.min(1 << left.max(1).ilog2()))
+    }
+
+    /// Keeps the result of a step.
+    fn accept(&mut self, stepped: &Stepped) {
+        let (solver, report) = (&mut *self.solver, &mut self.report);
+        std::mem::swap(&mut solver.lengths, &mut solver.lengths_now);
+        self.energies = stepped.after;
+        report.caps_hit += stepped.solved.caps + u32::from(stepped.solved.unmet > 0.0);
+        report.residual = report.residual.max(stepped.solved.residual);
+        report.error_estimate += stepped.estimate;
+        report.energy_removed += stepped.energy_removed;
+        report.energy_lost += stepped.energy_lost;
+        report.substeps += 1;
+        report.euler_steps += u32::from(stepped.euler);
+        report.stopped = report.stopped.max(stepped.stopped);
+        (report.contacts, report.deepest_overlap) = (stepped.contacts, report.deepest_overlap.max(stepped.overlap));
+        report.jammed = report.jammed.max(stepped.jammed);
     }
 }
 
-/// Takes one step between `times`, or two halves of it if contacts stay too deep, or several parts if it loses much of
-/// a bounce. Short steps are only cut further for deep contacts if that reduces the depth below `deepest`, metres.
-fn cut(
-    stepper: &mut Stepper<'_>,
-    motion: &mut Kinematics,
-    energies: &mut Energies,
-    report: &mut FrameReport,
-    times: [f64; 2],
-    deepest: f64,
-) {
-    /// Largest depth after halving ÷ before for which another halving is worth while.
-    const HELPS: f64 = 0.9;
-    /// Steps longer than this fraction of the frame are always halved.
-    const SHORT: f64 = 1.0 / 16.0;
-    /// Newton iterations of a frame after which steps are accepted, so that the frame ends.
-    const MOST_NEWTON: u32 = 400;
-    /// Relative error of the speed of a body in contact, and the largest number of parts into which a step is cut at
-    /// once for it.
-    const IMPACT_ERROR: f64 = 0.1;
-    const MOST_PARTS: f64 = 16.0;
-    /// Energy ÷ (E × volume) above which a body is crushed.
-    const CRUSHED: f64 = 10.0;
-    /// Newton iterations of a frame after which steps are no longer cut for that.
-    const MOST_NEWTON_OF_IMPACTS: u32 = 350;
-    let start = stepper.start(motion);
-    let turned = stepper.solver.inventory.inverted > 0;
-    let stepped = stepper.step(motion, times, energies, None);
-    let unmet = stepped.solved.unmet > 0.0 || stepped.solved.failed;
-    let share = times[1] - times[0];
-    let no_help = share <= SHORT && stepped.solved.unmet > HELPS * deepest;
-    let frame = stepper.frame;
-    // What is crushed, or starts out of balance, does not bounce.
-    let crushed = energies.scale() > CRUSHED * stepper.context.body.modulus_times_volume();
-    let bounces = frame.integrator == Integrator::Default
-        && frame.bounce.is_none_or(|bounce| bounce > 0.0 && bounce.is_finite())
-        && !(frame.force_implicit_euler || turned || crushed || stepped.jammed > 0);
-    let wanted = if bounces { (stepped.impact_error / IMPACT_ERROR).clamp(1.0, MOST_PARTS) } else { 1.0 };
-    let wanted = (wanted.ceil() as u32).next_power_of_two();
-    // As many as the frame can still pay for, if a part costs what the whole did.
-    let left = MOST_NEWTON_OF_IMPACTS.saturating_sub(report.newton) / stepped.solved.newton.max(1);
-    let parts = wanted.min(1 << left.max(1).ilog2());
-    let shortest = share <= 1.0 / f64::from(MOST_STEPS);
-    let is_over = (frame.cancelled)() || report.newton >= MOST_NEWTON || shortest;
-    if is_over || !(unmet && !no_help || parts > 1) {
-        report.uncut_impacts += u32::from(wanted > 1 && !shortest);
-        return accept(stepper, report, energies, &stepped);
-    }
-    add_work(report, &stepped);
-    stepper.restart(start, motion);
-    let parts = parts.min((share * f64::from(MOST_STEPS)) as u32).max(2);
-    let deepest = if unmet { stepped.solved.unmet } else { deepest };
-    let at = |part: u32| times[0] + share * f64::from(part) / f64::from(parts);
-    for part in 0..parts {
-        cut(stepper, motion, energies, report, [at(part), at(part + 1)], deepest);
-    }
-}
-
-/// Takes steps whose estimated error stays below `tolerance` metres a frame.
-fn adapt(
-    stepper: &mut Stepper<'_>,
-    motion: &mut Kinematics,
-    energies: &mut Energies,
-    report: &mut FrameReport,
-    tolerance: f64,
-) {
-    /// Bounds on the change of step size, and its safety factor.
-    const CHANGE: [f64; 2] = [0.2, 4.0];
+/// The number of parts that a step has to be cut into so that its estimated error is `allowed`, metres.
+fn accurate_parts(stepped: &Stepped, allowed: f64) -> u32 {
+    /// Safety factor.
     const RESERVE: f64 = 0.9;
-    /// Newton iterations of a frame after which steps are accepted and counted, so that the frame ends.
-    const MOST_NEWTON: u32 = 4000;
-    /// The share of what is left of the frame that each step from then on takes at least.
-    const LAST: f64 = 0.125;
-    let (mut time, mut share) = (0.0, 1.0_f64);
-    while time < 1.0 && !(stepper.frame.cancelled)() {
-        // Equal steps to the end, which avoids a tiny last one.
-        let left = 1.0 - time;
-        if report.newton >= MOST_NEWTON {
-            share = share.max(LAST * left);
-        }
-        let count = (left / share).ceil().clamp(1.0, f64::from(MOST_STEPS));
-        let end = if count <= 1.0 { 1.0 } else { time + left / count };
-        let before = stepper.start(motion);
-        let stepped = stepper.step(motion, [time, end], energies, Some(tolerance));
-        let allowed = tolerance * (end - time);
-        let smallest = end - time <= 2.0 / f64::from(MOST_STEPS) || report.newton >= MOST_NEWTON;
-        let fits = smallest || (stepped.estimate <= allowed && stepped.solved.unmet <= 0.0);
-        // The estimate ÷ step size is proportional to the step size for a first-order method, to its square for a
-        // second-order one.
-        let ratio = allowed / stepped.estimate;
-        let ratio = if stepped.euler { ratio } else { ratio.sqrt() };
-        let change = if stepped.estimate > 0.0 { RESERVE * ratio } else { CHANGE[1] };
-        share = ((end - time) * change.clamp(CHANGE[0], CHANGE[1])).clamp(1.0 / f64::from(MOST_STEPS), 1.0);
-        if stepped.solved.unmet > 0.0 {
-            // The estimate does not cover contacts: those that got deeper ask for shorter steps.
-            share = share.min(0.5 * (end - time)).max(1.0 / f64::from(MOST_STEPS));
-        }
-        if fits {
-            accept(stepper, report, energies, &stepped);
-            report.tolerance_missed += u32::from(stepped.estimate > allowed);
-            time = end;
-        } else {
-            add_work(report, &stepped);
-            stepper.restart(before, motion);
-        }
+    if stepped.estimate <= allowed {
+        return 1;
     }
-}
-
-/// Adds the cost of a step, whose result may be rejected.
-fn add_work(report: &mut FrameReport, stepped: &Stepped) {
-    report.newton += stepped.solved.newton;
-    report.cg += stepped.solved.cg;
-}
-
-/// Keeps the result of a step.
-fn accept(stepper: &mut Stepper<'_>, report: &mut FrameReport, energies: &mut Energies, stepped: &Stepped) {
-    let solver = &mut *stepper.solver;
-    std::mem::swap(&mut solver.lengths, &mut solver.lengths_now);
-    *energies = stepped.after;
-    add_work(report, stepped);
-    report.caps_hit += stepped.solved.caps + u32::from(stepped.solved.unmet > 0.0);
-    report.residual = report.residual.max(stepped.solved.residual);
-    report.error_estimate += stepped.estimate;
-    report.energy_removed += stepped.energy_removed;
-    report.energy_lost += stepped.energy_lost;
-    report.substeps += 1;
-    report.euler_steps += u32::from(stepped.euler);
-    report.stopped = report.stopped.max(stepped.stopped);
-    (report.contacts, report.deepest_overlap) = (stepped.contacts, report.deepest_overlap.max(stepped.overlap));
-    report.jammed = report.jammed.max(stepped.jammed);
+    // The estimate ÷ step size is proportional to the step size for a first-order method, to its square for a second-order
+    // one.
+    let ratio = stepped.estimate / allowed;
+    let ratio = if stepped.euler { ratio } else { ratio.sqrt() };
+    (ratio / RESERVE).ceil().clamp(2.0, MOST_PARTS) as u32
 }
 
 /// Energy `lost` in a frame in which gravity adds the speed `falling`, relative to what there was; 0 for slow bodies.
@@ -382,10 +338,4 @@ fn lost_share(lost: f64, [before, after]: [&Energies; 2], body: &SoftBody, falli
     let slow = 0.5 * body.mass.iter().sum::<f64>() * (SLOW * falling) * (SLOW * falling);
     let share = lost / before.scale().max(after.scale() + lost);
     if before.kinetic > slow + LITTLE * body.modulus_times_volume() && share.is_finite() { share } else { 0.0 }
-}
-
-fn describe(report: &mut FrameReport, context: &FrameContext<'_>, energies: &Energies, motion: &Kinematics) {
-    (report.kinetic, report.elastic) = (energies.kinetic, energies.springs);
-    (report.volume_energy, report.goal_energy) = (energies.volumes, energies.goals);
-    report.worst_stretch = super::energy::worst_stretch(context, &motion.x);
 }

@@ -64,7 +64,7 @@ impl StageSolver {
     pub(super) fn balance(&self, context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3]) -> LoadBalance {
         let body = context.body;
         let mut pieces = vec![PieceLoads::default(); body.order.pieces.len()];
-        for contact in stage.contacts.iter().filter(|contact| contact.has_friction()) {
+        for contact in stage.contacts.iter().filter(|contact| contact.friction > 0.0) {
             let now = contact.load_at(x);
             let mut last = usize::MAX;
             for (particle, weight) in contact.sides() {

@@ -1,7 +1,6 @@
 //! Exact conservation of linear and angular momentum of unconstrained groups of pieces, independent of the accuracy
 //! of linear solves.
 
-use super::assemble::velocities;
 use super::body::SoftBody;
 use super::contact::{ContactConstraint, ContactMode};
 use super::stage::{FrameContext, Stage, StageSolver};
@@ -52,7 +51,7 @@ impl StageSolver {
         }
         let mut links = Vec::new();
         for contact in contacts {
-            let first = piece_of(contact.first_particle());
+            let first = piece_of(contact.particles[0] as usize);
             for (particle, _) in contact.sides() {
                 touched[piece_of(particle) as usize] = true;
                 links.push([first, piece_of(particle)]);
@@ -86,7 +85,7 @@ impl StageSolver {
         let known = stage.contacts.iter().zip(&self.contact_states).zip(&self.friction_duals).enumerate();
         let obstacle_contacts = known.filter(|known| known.1.0.1.mode != ContactMode::Open).filter_map(
             |(index, ((contact, state), dual))| {
-                let piece = self.layout.piece_of(contact.first_particle());
+                let piece = self.layout.piece_of(contact.particles[0] as usize);
                 let group = self.groups[piece].filter(|_| !contact.is_two_sided())? as usize;
                 Some(ObstacleContact {
                     group,
@@ -148,18 +147,16 @@ impl StageSolver {
     }
 
     /// The positions `x`, with residual `r`, after each group was rotated as a whole so that it has the angular
-    /// momentum that the stage's equation demands, which corrects the error of linear solves; and the residual there.
-    /// Springs and volumes are not affected; the stiffness of contacts with obstacles is accounted for. `None` if there
-    /// is nothing to rotate.
+    /// momentum that the stage's equation demands, which corrects the error of linear solves. Springs and volumes are
+    /// not affected; the stiffness of contacts with obstacles is accounted for. `None` if there is nothing to rotate.
     pub(super) fn corrected_angular_momentum(
         &self,
-        context: &FrameContext<'_>,
+        body: &SoftBody,
         stage: &Stage<'_>,
         x: &[DVec3],
-    ) -> Option<(Vec<DVec3>, Vec<DVec3>)> {
+    ) -> Option<Vec<DVec3>> {
         /// Moments of inertia below this fraction of the trace are treated as zero.
         const NEGLIGIBLE: f64 = 1e-9;
-        let body = context.body;
         let inertia = &self.system.inertia;
         let members = || {
             let grouped = body.order.pieces.iter().zip(&self.groups);
@@ -201,33 +198,6 @@ impl StageSolver {
         for (group, particle, turn) in rotated() {
             corrected[particle] = middles[group] + turn.apply(x[particle] - middles[group]);
         }
-        // Internal forces depend on lengths and volumes only, so they rotate with the group.
-        let before = self.other_forces(context, stage, x);
-        let after = self.other_forces(context, stage, &corrected);
-        let mut r = self.r.clone();
-        for (_, particle, turn) in rotated() {
-            let (mass, y, a2) = (body.mass[particle], stage.y[particle], stage.a * stage.a);
-            let internal = r[particle] + (x[particle] - y) * mass - before[particle] * a2;
-            r[particle] = turn.apply(internal) + after[particle] * a2 - (corrected[particle] - y) * mass;
-        }
-        Some((corrected, r))
-    }
-
-    /// External and contact forces at the positions `x`: those that do not rotate with a group.
-    fn other_forces(&self, context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3]) -> Vec<DVec3> {
-        let body = context.body;
-        let mut v = Vec::new();
-        velocities(&body.order.clusters, x, stage, &mut v);
-        let own = |particle: usize| {
-            context.external.force(particle, body.mass[particle], stage.time, x[particle], v[particle])
-        };
-        let mut forces: Vec<DVec3> = (0..x.len()).map(own).collect();
-        for contact in stage.contacts {
-            let state = contact.at(x, &v, stage.early, body.size);
-            if state.mode != ContactMode::Open {
-                contact.sides().for_each(|(particle, weight)| forces[particle] += state.force * weight);
-            }
-        }
-        forces
+        Some(corrected)
     }
 }

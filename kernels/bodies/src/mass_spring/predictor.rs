@@ -13,7 +13,7 @@ use std::ops::Range;
 const NEGLIGIBLE: f64 = 1e-9;
 
 /// Rigid motion of a piece.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct RigidMotion {
     pub(super) particles: Range<usize>,
     centroid: DVec3,
@@ -40,17 +40,7 @@ impl RigidMotion {
         acceleration: &[DVec3],
     ) -> Self {
         let particles = body.particles(piece);
-        let [centroid, linear_velocity, angular_velocity] = [DVec3::zeros(); 3];
-        let still = Self {
-            particles: particles.clone(),
-            centroid,
-            linear_velocity,
-            angular_velocity,
-            acceleration: DVec3::zeros(),
-            energy: 0.0,
-            inverse_mass: 0.0,
-            inverse_inertia: DMat3::zeros(),
-        };
+        let still = Self { particles: particles.clone(), ..Self::default() };
         if held[particles.clone()].contains(&true) {
             return still;
         }

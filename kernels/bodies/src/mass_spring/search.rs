@@ -155,7 +155,7 @@ impl StageSolver {
             }
         }
         let stage = &Stage { contacts: &*contacts, ..*stage };
-        if self.correct_angular_momentum_downhill(context, stage, base, x) && !solved.failed {
+        if self.correct_angular_momentum_downhill(context, stage, base.sum(), x) && !solved.failed {
             solved.set_residual(self.square(&context.body.order.clusters));
         }
         solved
@@ -167,22 +167,19 @@ impl StageSolver {
         &mut self,
         context: &FrameContext<'_>,
         stage: &Stage<'_>,
-        base: ObjectiveParts,
+        base: f64,
         x: &mut [DVec3],
     ) -> bool {
-        let Some((turned, r)) = self.corrected_angular_momentum(context, stage, x).filter(|new| new.0 != x) else {
-            return false;
-        };
-        let contacts = self.contact_objective(context, stage, &turned);
-        let level = ObjectiveParts { contacts, others: self.other_objective(context, stage, &turned) };
-        self.measured = level.sum() <= base.sum() + ROUNDING * base.sum().abs();
+        let turned = self.corrected_angular_momentum(context.body, stage, x);
+        let Some(turned) = turned.filter(|turned| turned != x) else { return false };
+        let level = self.contact_objective(context, stage, &turned) + self.other_objective(context, stage, &turned);
+        self.measured = level <= base + ROUNDING * base.abs();
         if self.measured {
             x.copy_from_slice(&turned);
-            self.r = r;
-        } else {
-            velocities(&context.body.order.clusters, x, stage, &mut self.v);
+            self.assemble(context, stage, x, false);
+            return true;
         }
-        self.measured
+        false
     }
 
     /// The objective ½(x − y)ᵀM(x − y) + a²·(potentials) without contacts, at positions for which
@@ -228,9 +225,7 @@ impl StageSolver {
     fn store_noncontact_residual(&mut self, stage: &Stage<'_>) {
         self.noncontact_residual.clone_from(&self.r);
         for (contact, state) in stage.contacts.iter().zip(&self.contact_states) {
-            for (particle, weight) in contact.sides().filter(|side| !self.system.held[side.0]) {
-                self.noncontact_residual[particle] -= state.force * (weight * stage.a * stage.a);
-            }
+            contact.push(state.force * (-stage.a * stage.a), &mut self.noncontact_residual);
         }
     }
 

@@ -41,7 +41,7 @@ const NONLINEAR: f64 = 0.35;
 const RISE: f64 = 100.0;
 
 /// The equation of a stage.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct Stage<'a> {
     pub(super) y: &'a [DVec3],
     pub(super) z: &'a [DVec3],
@@ -210,9 +210,9 @@ impl StageSolver {
     ) -> Solved {
         self.begin(context, stage.contacts);
         let mut solved = self.iterate(context, stage, newton, cached, x);
-        if let Some((corrected, r)) = self.corrected_angular_momentum(context, stage, x) {
+        if let Some(corrected) = self.corrected_angular_momentum(context.body, stage, x) {
             x.copy_from_slice(&corrected);
-            self.r = r;
+            self.assemble(context, stage, x, false);
             if !solved.failed {
                 solved.set_residual(self.square(&context.body.order.clusters));
             }
@@ -287,26 +287,23 @@ impl StageSolver {
         thinned
     }
 
-    /// Applies the preconditioner to `r`, an approximation of A⁻¹r.
-    pub(super) fn smooth(&self, body: &SoftBody, cached: &CachedCoarseFactor, r: &mut [DVec3]) {
-        let coarse = Coarse::new(cached, &self.offset_from_centroid);
-        conjugate_gradients::precondition(&self.system, body, coarse, r);
-    }
-
-    /// Replaces `r` by A⁻¹r, computed with conjugate gradients.
+    /// A⁻¹r, computed with conjugate gradients if it has to be `accurate`, and approximated by the preconditioner if not;
+    /// and the number of iterations.
     pub(super) fn filter(
         &mut self,
         body: &SoftBody,
         cached: &CachedCoarseFactor,
-        r: &mut Vec<DVec3>,
-    ) -> conjugate_gradients::Reached {
+        accurate: bool,
+        mut r: Vec<DVec3>,
+    ) -> (Vec<DVec3>, u32) {
         let coarse = Coarse::new(cached, &self.offset_from_centroid);
-        let limits = Limits { share: CG_SHARE, square: f64::INFINITY, cap: CG_CAP };
+        if !accurate {
+            return (conjugate_gradients::precondition(&self.system, body, coarse, &r), 0);
+        }
+        let (limits, scratch) = (Limits { share: CG_SHARE, square: f64::INFINITY, cap: CG_CAP }, &mut self.scratch);
         let mut out = vec![DVec3::zeros(); r.len()];
-        let reached =
-            conjugate_gradients::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut out, r);
-        *r = out;
-        reached
+        let reached = conjugate_gradients::solve(&mut self.system, body, coarse, limits, scratch, &mut out, &mut r);
+        (out, reached.iterations)
     }
 
     /// Number of closed contacts, and the depth of the deepest, metres below its gap.
@@ -422,9 +419,7 @@ mod tests {
             springs::particle_stiffness(&body, &context.rest, &mut solver.particle_stiffness);
             let volumes = solver.volumes.at(&body, &start);
             solver.set_step_start(&context, h, |a, b| springs::distance(&start, a, b), volumes);
-            let (y, z, contacts) = (&inertial[..], &start[..], &[][..]);
-            let stage =
-                Stage { y, z, a: h, time: 1.0, contacts, early: 0.0, rotational_energy: &[], line_search, index: 0 };
+            let stage = Stage { y: &inertial, z: &start, a: h, time: 1.0, line_search, ..Stage::default() };
             let (mut cached, mut x) = (CachedCoarseFactor::default(), inertial.clone());
             let solved = if line_search {
                 let enough = StopCriteria { share: 0.05, scale: f64::INFINITY, square: 0.0, first: 0.0 };
@@ -433,7 +428,7 @@ mod tests {
                 solver.solve(&context, &stage, Newton { most: 1, tolerance: 0.0 }, &mut cached, &mut x)
             };
             solver.assemble(&context, &stage, &x, false);
-            assert!(solver.corrected_angular_momentum(&context, &stage, &x).is_some(), "nothing holds the block");
+            assert!(solver.corrected_angular_momentum(&body, &stage, &x).is_some(), "nothing holds the block");
             let residual = (solver.square(&body.order.clusters) / solved.first).sqrt();
             assert!(residual > 0.0 && !solved.failed, "{solved:?}");
             let off = (solved.residual / residual - 1.0).abs();

@@ -14,7 +14,7 @@ use super::body::SoftBody;
 use super::bounce::Impact;
 use super::contact::{ContactConstraint, ContactMode};
 use super::energy::{Energies, measure};
-use super::frame::{Integrator, SolverFrame};
+use super::frame::{FrameReport, Integrator, SolverFrame};
 use super::predictor::RigidMotion;
 use super::stage::{FrameContext, Solved, StageSolver};
 use super::state::CachedCoarseFactor;
@@ -67,6 +67,8 @@ pub(super) struct Stepper<'a> {
     pub(super) frame: &'a SolverFrame<'a>,
     /// Length of the frame, seconds.
     pub(super) seconds: f64,
+    /// Error of positions in a frame that [`Integrator::Accurate`] allows, metres.
+    pub(super) tolerance: Option<f64>,
     pub(super) cached: &'a mut CachedCoarseFactor,
     /// Number of steps still to be taken with implicit Euler.
     pub(super) euler_steps_left: &'a mut u32,
@@ -74,18 +76,15 @@ pub(super) struct Stepper<'a> {
     pub(super) energy_budget: &'a mut f64,
     /// Pieces in contact, if bounces are limited.
     pub(super) impacts: &'a mut Vec<Impact>,
+    /// Energies after the last step that was accepted, and what is reported of all of them.
+    pub(super) energies: Energies,
+    pub(super) report: FrameReport,
 }
 
 impl Stepper<'_> {
-    /// Steps between two `times`, as fractions of the frame. `tolerance`, metres, makes Newton's method converge.
-    /// `before` are the energies at the start.
-    pub(super) fn step(
-        &mut self,
-        motion: &mut Kinematics,
-        times: [f64; 2],
-        before: &Energies,
-        tolerance: Option<f64>,
-    ) -> Stepped {
+    /// Steps between two `times`, as fractions of the frame.
+    pub(super) fn step(&mut self, motion: &mut Kinematics, times: [f64; 2]) -> Stepped {
+        let before = &{ self.energies };
         let h = (times[1] - times[0]) * self.seconds;
         let start = motion.clone();
         let mut full = match self.frame.contacts {
@@ -105,7 +104,7 @@ impl Stepper<'_> {
             let (solved, errors) = self.euler(motion, times, &mut full, damped);
             (Stepped { solved, euler: true, ..Stepped::default() }, errors, None)
         } else {
-            self.tr_bdf2_or_euler(motion, times, before, tolerance, &mut full)
+            self.tr_bdf2_or_euler(motion, times, before, &mut full)
         };
         stepped.estimate = errors.iter().map(DVec3::norm_squared).fold(0.0, f64::max).sqrt();
         if full.iter().any(|c| (c.clearance(&start.x, h) < 0.0) != (c.clearance(&motion.x, 0.0) < 0.0)) {
@@ -151,13 +150,12 @@ impl Stepper<'_> {
         motion: &mut Kinematics,
         times: [f64; 2],
         before: &Energies,
-        tolerance: Option<f64>,
         contacts: &mut Vec<ContactConstraint>,
     ) -> (Stepped, Vec<DVec3>, Option<Energies>) {
         let (h, size) = ((times[1] - times[0]) * self.seconds, self.context.body.size);
         let start = motion.clone();
         let frozen: Vec<ContactConstraint> = contacts.iter().map(|c| c.frozen(&start.x, &start.v, h, size)).collect();
-        let (mut solved, errors) = self.tr_bdf2(motion, times, &frozen, tolerance);
+        let (mut solved, errors) = self.tr_bdf2(motion, times, &frozen);
         let (mut gained, mut active_set_unchanged) = (false, true);
         if let Some(errors) = errors {
             let energies = measure(self.solver, &self.context, times[1], motion, true);

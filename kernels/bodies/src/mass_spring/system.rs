@@ -18,8 +18,6 @@ pub(super) struct System {
     pub(super) records: Vec<Record>,
     /// Isotropic diagonal terms of each particle: mass, drag, goals. Kilograms.
     pub(super) inertia: Vec<f64>,
-    /// Other diagonal blocks, xx xy xz yy yz zz; empty without any.
-    pub(super) blocks: Vec<[f64; 6]>,
     /// Pinned particles.
     pub(super) held: Vec<bool>,
     /// Particles without intact springs; empty if there are none.
@@ -62,9 +60,6 @@ impl System {
                 if system.held[particle] {
                     out[particle - first] = DVec3::zeros();
                     continue;
-                }
-                if !system.blocks.is_empty() {
-                    total += times(&system.blocks[particle], mine);
                 }
                 if regions {
                     total += system.regions.push(particle);

@@ -44,29 +44,19 @@ struct StageEnd {
 impl<'a> Step<'a> {
     /// The equation of one of the stages.
     fn stage<'b>(&'b self, y: &'b [DVec3], z: &'b [DVec3], time: f64, early: f64, index: usize) -> Stage<'b> {
-        Stage {
-            y,
-            z,
-            a: self.a,
-            time,
-            contacts: self.contacts,
-            early,
-            rotational_energy: &self.rotational_energy,
-            line_search: false,
-            index,
-        }
+        let (a, contacts, rotational_energy) = (self.a, self.contacts, &self.rotational_energy[..]);
+        Stage { y, z, a, time, contacts, early, rotational_energy, index, ..Stage::default() }
     }
 }
 
 impl Stepper<'_> {
     /// Advances `motion` between two `times` with frozen `contacts`; returns the estimated errors of positions too, or `None` if it
-    /// stopped halfway, where tetrahedra became thin. `tolerance`, metres, makes Newton's method converge.
+    /// stopped halfway, where tetrahedra became thin. With a tolerance Newton's method converges.
     pub(super) fn tr_bdf2(
         &mut self,
         motion: &mut Kinematics,
         times: [f64; 2],
         contacts: &[ContactConstraint],
-        tolerance: Option<f64>,
     ) -> (Solved, Option<Vec<DVec3>>) {
         let body = self.context.body;
         let h = (times[1] - times[0]) * self.seconds;
@@ -81,7 +71,7 @@ impl Stepper<'_> {
             times,
             h,
             a: 0.5 * GAMMA * h,
-            newton: match tolerance {
+            newton: match self.tolerance {
                 Some(tolerance) => Newton { most: MOST_ACCURATE, tolerance: NEWTON_SHARE * tolerance },
                 None => Newton { most: MOST, tolerance: 0.0 },
             },
@@ -92,13 +82,9 @@ impl Stepper<'_> {
         }
         let end = self.backward_difference_stage(&step, &middle);
         let mut solved = sum(middle.solved, end.solved);
-        let mut error = self.unfiltered_error(&step, &middle, &end);
-        if tolerance.is_some() {
-            let reached = self.solver.filter(body, self.cached, &mut error);
-            solved.cg += reached.iterations;
-        } else {
-            self.solver.smooth(body, self.cached, &mut error);
-        }
+        let error = self.unfiltered_error(&step, &middle, &end);
+        let (error, iterations) = self.solver.filter(body, self.cached, self.tolerance.is_some(), error);
+        solved.cg += iterations;
         (motion.x, motion.v) = (end.x, end.v);
         (solved, Some(error))
     }

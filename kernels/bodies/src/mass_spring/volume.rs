@@ -123,11 +123,9 @@ impl Volumes {
             changes: vec![[0.0; 2]; regions.len()],
             tangents: vec![[0.0; 2]; regions.len()],
             offsets: vec![0.0; regions.len()],
-            predicted: Vec::new(),
             a: f64::INFINITY,
             before: vec![0.0; regions.len()],
-            stored: 0.0,
-            damped: 0.0,
+            ..Self::default()
         }
     }
 
@@ -284,9 +282,13 @@ fn stiffened(change: f64, rest: f64, [doubled, end]: [f64; 2]) -> (f64, f64, f64
     if change.abs() <= end {
         return curved(change);
     }
-    let (push, slope, energy) = curved(end);
-    let more = change.abs() - end;
-    ((push + slope * more).copysign(change), slope, energy + push * more + 0.5 * slope * more * more)
+    let (push, slope, energy) = continued(curved(end), change.abs() - end);
+    (push.copysign(change), slope, energy)
+}
+
+/// A force with its derivative and its integral, continued linearly for `more`.
+pub(super) fn continued((push, slope, energy): (f64, f64, f64), more: f64) -> (f64, f64, f64) {
+    (push + slope * more, slope, energy + push * more + 0.5 * slope * more * more)
 }
 
 /// The tangent to [`stiffened`] where it resists with `expected`: its value and its derivative at `change`. `None` where that is
@@ -308,7 +310,7 @@ fn barrier(left: f64, rest: f64) -> (f64, f64, f64) {
     let inverted = (left - THIN * rest).max(0.0);
     let (push, slope, energy) = stiffened(left - inverted, rest, [THIN_STIFFENING, THIN]);
     let slope = if inverted > 0.0 { 1.0 } else { slope };
-    (push + inverted, slope, energy + push * inverted + 0.5 * inverted * inverted)
+    continued((push, slope, energy), inverted)
 }
 
 /// Gradient of a tetrahedron's volume with respect to each corner.

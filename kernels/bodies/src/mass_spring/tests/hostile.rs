@@ -18,7 +18,7 @@ fn mixed(stiffness: impl Fn(usize) -> f64, mass: impl Fn(usize) -> f64) -> SoftB
             ends,
             stiffness: stiffness(i),
             damping: 1e-4 * stiffness(i),
-            length: shape.lengths()[i],
+            length: shape.lengths[i],
         })
         .collect();
     let masses: Vec<f64> = (0..points.len()).map(mass).collect();
