@@ -364,11 +364,8 @@ impl CellRows {
         start: impl Fn() -> S + Sync,
         values: impl Fn(&mut S, Cell, usize) -> [T; N] + Sync,
     ) -> [Vec<T>; N] {
-        let mut out: [Vec<T>; N] = std::array::from_fn(|_| vec![T::default(); self.len()]);
-        let spans: Vec<_> = self.spans().collect();
-        parallel::for_each(parts(&spans, out.each_mut().map(|field| &mut field[..])), |_, (spans, part)| {
+        self.tabulate_parts(|spans, first, part| {
             let mut state = start();
-            let first = spans[0].1.base as usize;
             for ([y, z], span) in spans {
                 for x in span.start..span.end {
                     let at = span.at(x);
@@ -378,6 +375,19 @@ impl CellRows {
                     }
                 }
             }
+        })
+    }
+
+    /// Fields of 0 whose parts `fill` changes: it gets the spans of a part, where its first value is, and its values. In
+    /// parallel.
+    pub(crate) fn tabulate_parts<T: Copy + Default + Send, const N: usize>(
+        &self,
+        fill: impl Fn(&[PlacedSpan], usize, [&mut [T]; N]) + Sync,
+    ) -> [Vec<T>; N] {
+        let mut out: [Vec<T>; N] = std::array::from_fn(|_| vec![T::default(); self.len()]);
+        let spans: Vec<_> = self.spans().collect();
+        parallel::for_each(parts(&spans, out.each_mut().map(|field| &mut field[..])), |_, (spans, part)| {
+            fill(spans, spans[0].1.base as usize, part);
         });
         out
     }
