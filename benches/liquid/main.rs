@@ -9,6 +9,7 @@
 mod flows;
 mod frames;
 mod pressure;
+mod pressure_scene;
 mod surface;
 mod table;
 #[path = "../timing/mod.rs"]

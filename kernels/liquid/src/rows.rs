@@ -166,12 +166,18 @@ impl CellRows {
 
     /// The spans of a row, ascending.
     pub fn row(&self, y: i32, z: i32) -> &[RowSpan] {
-        let [j, k] = [i64::from(y) - i64::from(self.low[0]), i64::from(z) - i64::from(self.low[1])];
-        if j < 0 || k < 0 || j >= i64::from(self.size[0]) || k >= i64::from(self.size[1]) {
-            return &[];
-        }
-        let row = j as usize + k as usize * self.size[0] as usize;
-        &self.spans[self.first[row] as usize..self.first[row + 1] as usize]
+        // Numbers below 0 become huge.
+        let from = |low: i32, n: i32| (i64::from(n) - i64::from(low)) as u64;
+        let [j, k] = [from(self.low[0], y), from(self.low[1], z)];
+        let [rows, layers] = self.size.map(|n| n as u64);
+        if j < rows && k < layers { self.row_numbered((j + k * rows) as usize) } else { &[] }
+    }
+
+    /// The spans of a row, given its number among all rows.
+    #[inline(always)]
+    fn row_numbered(&self, number: usize) -> &[RowSpan] {
+        let ends = &self.first[number..number + 2];
+        &self.spans[ends[0] as usize..ends[1] as usize]
     }
 
     /// Where the value of a cell is; `None` where it is not stored.
@@ -193,8 +199,9 @@ impl CellRows {
     /// Those of some layers along z, counted from the first.
     fn rows_of(&self, layers: Range<i32>) -> impl Iterator<Item = ([i32; 2], &[RowSpan])> {
         let ny = self.size[0];
-        let rows = layers.flat_map(move |k| (0..ny).map(move |j| [self.low[0] + j, self.low[1] + k]));
-        rows.map(|[y, z]| ([y, z], self.row(y, z))).filter(|(_, spans)| !spans.is_empty())
+        let rows = layers.flat_map(move |k| (0..ny).map(move |j| (j, k, j as usize + k as usize * ny as usize)));
+        let spans = rows.map(|(j, k, number)| ([self.low[0] + j, self.low[1] + k], self.row_numbered(number)));
+        spans.filter(|(_, spans)| !spans.is_empty())
     }
 
     /// The spans with the y and z of their row, in the order of fields.
@@ -364,11 +371,8 @@ impl CellRows {
         start: impl Fn() -> S + Sync,
         values: impl Fn(&mut S, Cell, usize) -> [T; N] + Sync,
     ) -> [Vec<T>; N] {
-        let mut out: [Vec<T>; N] = std::array::from_fn(|_| vec![T::default(); self.len()]);
-        let spans: Vec<_> = self.spans().collect();
-        parallel::for_each(parts(&spans, out.each_mut().map(|field| &mut field[..])), |_, (spans, part)| {
+        self.tabulate_parts(|spans, first, part| {
             let mut state = start();
-            let first = spans[0].1.base as usize;
             for ([y, z], span) in spans {
                 for x in span.start..span.end {
                     let at = span.at(x);
@@ -378,6 +382,19 @@ impl CellRows {
                     }
                 }
             }
+        })
+    }
+
+    /// Fields of 0 whose parts `fill` changes: it gets the spans of a part, where its first value is, and its values. In
+    /// parallel.
+    pub(crate) fn tabulate_parts<T: Copy + Default + Send, const N: usize>(
+        &self,
+        fill: impl Fn(&[PlacedSpan], usize, [&mut [T]; N]) + Sync,
+    ) -> [Vec<T>; N] {
+        let mut out: [Vec<T>; N] = std::array::from_fn(|_| vec![T::default(); self.len()]);
+        let spans: Vec<_> = self.spans().collect();
+        parallel::for_each(parts(&spans, out.each_mut().map(|field| &mut field[..])), |_, (spans, part)| {
+            fill(spans, spans[0].1.base as usize, part);
         });
         out
     }

@@ -34,6 +34,14 @@ impl Run {
     pub fn range(&self) -> Range<usize> {
         self.at as usize..self.at as usize + self.len as usize
     }
+
+    /// Where the value of cell `n` is, and those of its neighbours below and above along x, y and z.
+    #[inline(always)]
+    pub fn neighbours(&self, n: usize) -> (usize, [usize; 3], [usize; 3]) {
+        let at = self.at as usize + n;
+        let [[y_below, y_above], [z_below, z_above]] = [self.y, self.z].map(|rows| rows.map(|row| row as usize + n));
+        (at, [at - 1, y_below, z_below], [at + 1, y_above, z_above])
+    }
 }
 
 /// The values that one thread writes, and the runs among them.
@@ -205,8 +213,10 @@ mod tests {
                     [x, y, z - 1],
                     [x, y, z + 1],
                 ];
-                let expected = [at, at - 1, at + 1, run.y[0] + n, run.y[1] + n, run.z[0] + n, run.z[1] + n];
-                assert_eq!(near.map(|cell| rows.find(cell).map(|at| at as u32)), expected.map(Some));
+                let (own, below, above) = run.neighbours(n as usize);
+                assert_eq!(own, at as usize);
+                let expected = [own, below[0], above[0], below[1], above[1], below[2], above[2]];
+                assert_eq!(near.map(|cell| rows.find(cell)), expected.map(Some));
             }
         }
         assert_eq!(cells.next(), None);

@@ -100,9 +100,7 @@ impl Contacts {
         let mut contacts = Self::default();
         for run in runs {
             for n in 0..run.len as usize {
-                let at = run.at as usize + n;
-                let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
-                let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
+                let (at, below, above) = run.neighbours(n);
                 for axis in 0..3 {
                     contacts.add(level, number, axis, [at, below[axis]], at);
                     // The face to a liquid cell above is that one's, too.

@@ -21,9 +21,7 @@ impl Factors {
         let mut rows = vec![0.0; n * n];
         let runs = level.stencil.runs().iter();
         for (row, (run, step)) in runs.flat_map(|run| (0..run.len as usize).map(move |step| (run, step))).enumerate() {
-            let at = run.at as usize + step;
-            let above = [at + 1, run.y[1] as usize + step, run.z[1] as usize + step];
-            let below = [at - 1, run.y[0] as usize + step, run.z[0] as usize + step];
+            let (at, below, above) = run.neighbours(step);
             rows[row * n + row] += f64::from(level.surface[at]);
             for axis in 0..3 {
                 for (neighbour, face) in [(below[axis], at), (above[axis], above[axis])] {

@@ -63,12 +63,10 @@ impl Level {
         stencil.update([&mut surface, &mut inverse_diagonal], |runs, first, [surface, inverse]| {
             for run in runs {
                 for n in 0..run.len as usize {
-                    let at = run.at as usize + n;
-                    // Each neighbour, and the cell whose low face lies between.
-                    let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
-                    let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
+                    let (at, below, above) = run.neighbours(n);
                     let (mut sum, mut to_air) = (0.0, 0.0);
                     for axis in 0..3 {
+                        // Each neighbour, and the cell whose low face lies between.
                         for (neighbour, face) in [(below[axis], at), (above[axis], above[axis])] {
                             let weight = f64::from(weights[axis][face]);
                             sum += weight;

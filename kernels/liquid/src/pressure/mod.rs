@@ -289,9 +289,7 @@ fn surface_distances(stencil: &Stencil, level_set: &[f32], images: &Images) -> S
         let mut beyond = Vec::new();
         for run in runs {
             for n in 0..run.len as usize {
-                let at = run.at as usize + n;
-                let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
-                let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
+                let (at, below, above) = run.neighbours(n);
                 for axis in 0..3 {
                     if level_set[below[axis]] >= -LEAST_DEPTH {
                         out[axis][at - first] = distance(at, below[axis]);

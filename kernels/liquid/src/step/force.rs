@@ -27,9 +27,8 @@ pub(super) fn pressed(
     let mut sum = [0.0; 3];
     for run in solver.stencil().runs() {
         for n in 0..run.len as usize {
-            let [at, x, y, z] = above(run, n);
-            let area =
-                [(0, x), (1, y), (2, z)].map(|(axis, above)| f64::from(covered[axis][above] - covered[axis][at]));
+            let (at, _, above) = run.neighbours(n);
+            let area = [0, 1, 2].map(|axis| f64::from(covered[axis][above[axis]] - covered[axis][at]));
             if area == [0.0; 3] {
                 continue;
             }
@@ -50,17 +49,11 @@ fn on_solver(solver: &PressureSolver, rows: &CellRows, field: &[f32]) -> Vec<f32
     solver.rows().resampled(rows, field, 0.0)
 }
 
-/// A cell of a run, and those above it along x, y and z.
-fn above(run: &Run, n: usize) -> [usize; 4] {
-    let at = run.at as usize + n;
-    [at, at + 1, run.y[1] as usize + n, run.z[1] as usize + n]
-}
-
 /// How a pressure changes along each axis, per cell: the mean of the differences to liquid neighbours; 0 without one.
 fn slopes(solver: &PressureSolver, open: &FaceFields<f32>, q: &[f64], run: &Run, n: usize) -> [f64; 3] {
-    let [at, x, y, z] = above(run, n);
-    let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
-    [(0, x), (1, y), (2, z)].map(|(axis, above): (usize, usize)| {
+    let (at, below, above) = run.neighbours(n);
+    [0, 1, 2].map(|axis| {
+        let above = above[axis];
         let is_joined = |face: usize, other: usize| open[axis][face] > 0.0 && solver.is_liquid(other);
         let (mut sum, mut count) = (0.0, 0.0);
         if is_joined(at, below[axis]) {

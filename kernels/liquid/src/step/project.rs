@@ -181,10 +181,10 @@ pub(super) fn net(rows: &CellRows, stencil: &Stencil, through: &FaceFields<f64>)
     stencil.update([&mut inflow], |runs, first, [inflow]| {
         for run in runs {
             for n in 0..run.len as usize {
-                let at = run.at as usize + n;
-                let along_x = through[0][at] - through[0][at + 1];
-                let along_y = through[1][at] - through[1][run.y[1] as usize + n];
-                let along_z = through[2][at] - through[2][run.z[1] as usize + n];
+                let (at, _, [x, y, z]) = run.neighbours(n);
+                let along_x = through[0][at] - through[0][x];
+                let along_y = through[1][at] - through[1][y];
+                let along_z = through[2][at] - through[2][z];
                 inflow[at - first] = along_x + along_y + along_z;
             }
         }

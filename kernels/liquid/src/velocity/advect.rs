@@ -1,9 +1,12 @@
 //! Points and fields carried by a velocity.
 
-use numerics::vector::{Vec3, add, scale};
+use numerics::lanes::{F32x16, LANES, Lanes, get, set};
+use numerics::simd::{Path, kernel};
+use numerics::vector::Vec3;
 
-use crate::rows::{CellRows, Periods};
-use crate::velocity::{Around, Corners, FaceFields, FaceMask, MacVelocity, Sampler, Site, trilinear, within};
+use crate::rows::{Cell, CellRows, Periods, PlacedSpan};
+use crate::velocity::batch::{ValuesAround, velocity};
+use crate::velocity::{Around, FaceFields, FaceMask, MacVelocity, Sampler, Site, within};
 
 /// Follows points through a velocity that does not change meanwhile, by Ralston's third-order method (1962).
 #[derive(Clone, Debug)]
@@ -28,33 +31,68 @@ impl<'a> Tracer<'a> {
         Self { periods, ..self }
     }
 
-    /// Where a point at `start` goes.
-    #[inline(always)]
-    pub fn trace(&mut self, start: Vec3) -> Vec3 {
-        let velocity = self.velocity.at(&mut self.sampler, start);
-        self.trace_from(start, velocity)
-    }
-
-    /// The same, given the velocity at `start`.
-    #[inline(always)]
-    fn trace_from(&mut self, start: Vec3, velocity: Vec3) -> Vec3 {
-        let a = velocity;
-        let b = self.moved(start, scale(a, 0.5));
-        let b = self.velocity.at(&mut self.sampler, b);
-        let c = self.moved(start, scale(b, 0.75));
-        let c = self.velocity.at(&mut self.sampler, c);
-        let mean = add(scale(a, 2.0 / 9.0), add(scale(b, 3.0 / 9.0), scale(c, 4.0 / 9.0)));
-        self.moved(start, mean)
+    /// Where points at `starts` go, given the velocity there.
+    pub fn trace(&mut self, starts: &Lanes<3>, velocities: &Lanes<3>) -> Lanes<3> {
+        trace(Path::chosen(), self, starts, velocities)
     }
 
     #[inline(always)]
-    fn moved(&self, start: Vec3, velocity: Vec3) -> Vec3 {
-        let mut point = self.periods.home_point(add(start, scale(velocity, self.step)));
+    fn trace_lanes(&mut self, starts: &Lanes<3>, a: &Lanes<3>) -> Lanes<3> {
+        let b = self.moved(starts, &scaled(a, 0.5));
+        let b = velocity(&mut self.sampler, self.velocity.faces(), &b);
+        let c = self.moved(starts, &scaled(&b, 0.75));
+        let c = velocity(&mut self.sampler, self.velocity.faces(), &c);
+        let mut mean = *a;
         for axis in 0..3 {
-            point[axis] = within(point[axis], self.bounds[0][axis], self.bounds[1][axis]);
+            for lane in 0..LANES {
+                let [a, b, c] = [a[axis].0[lane], b[axis].0[lane], c[axis].0[lane]];
+                mean[axis].0[lane] = a * (2.0 / 9.0) + (b * (3.0 / 9.0) + c * (4.0 / 9.0));
+            }
         }
-        point
+        self.moved(starts, &mean)
     }
+
+    #[inline(always)]
+    fn moved(&self, starts: &Lanes<3>, velocities: &Lanes<3>) -> Lanes<3> {
+        let mut points = *starts;
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                points[axis].0[lane] += velocities[axis].0[lane] * self.step;
+            }
+        }
+        if self.periods.any() {
+            for lane in 0..LANES {
+                let home = self.periods.home_point(get(&points, lane));
+                set(&mut points, lane, home);
+            }
+        }
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                points[axis].0[lane] = within(points[axis].0[lane], self.bounds[0][axis], self.bounds[1][axis]);
+            }
+        }
+        points
+    }
+}
+
+#[inline(always)]
+fn scaled(velocities: &Lanes<3>, by: f32) -> Lanes<3> {
+    let mut out = *velocities;
+    for axis in 0..3 {
+        for lane in 0..LANES {
+            out[axis].0[lane] *= by;
+        }
+    }
+    out
+}
+
+kernel! {
+    fn trace(tracer: &mut Tracer<'_>, starts: &Lanes<3>, velocities: &Lanes<3>) -> Lanes<3> = trace_body;
+}
+
+#[inline(always)]
+fn trace_body(tracer: &mut Tracer<'_>, starts: &Lanes<3>, velocities: &Lanes<3>) -> Lanes<3> {
+    tracer.trace_lanes(starts, velocities)
 }
 
 /// How values are carried.
@@ -83,8 +121,69 @@ pub struct Advection<'a> {
     pub scheme: Scheme,
 }
 
-/// A value carried, and those around the place that it came from.
+/// A value carried, and the least and the largest around the place that it came from.
 type Bounded = [f32; 3];
+
+/// Faces across one axis that are followed side by side.
+struct Batch {
+    axis: usize,
+    /// Where their values are stored.
+    at: [usize; LANES],
+    /// The same in the fields that are carried; [`NOWHERE`] where not all around are stored.
+    before: [usize; LANES],
+    starts: Lanes<3>,
+    velocities: Lanes<3>,
+    len: usize,
+}
+
+const NOWHERE: usize = usize::MAX;
+
+impl Batch {
+    /// The next `count` faces: where they are and where their values are stored, given that of the first.
+    #[inline(always)]
+    fn put(&mut self, count: usize, cell: Cell, [at, before]: [usize; 2]) {
+        let start = Site::FACES[self.axis].of(cell);
+        for n in 0..count {
+            let lane = self.len + n;
+            (self.at[lane], self.before[lane]) = (at + n, before.wrapping_add(n));
+            set(&mut self.starts, lane, [start[0] + n as f32, start[1], start[2]]);
+        }
+    }
+}
+
+kernel! {
+    fn carried(tracer: &mut Tracer<'_>, batch: &Batch, field: &[f32]) -> [F32x16; 3] = carried_body;
+}
+
+kernel! {
+    fn returned(
+        tracer: &mut Tracer<'_>, batch: &Batch, there: &mut Sampler<'_>, field: &[f32], wanted: &[FaceMask],
+    ) -> (F32x16, [bool; LANES]) = returned_body;
+}
+
+/// The value of a field where each face comes from, and the least and the largest around.
+#[inline(always)]
+fn carried_body(tracer: &mut Tracer<'_>, batch: &Batch, field: &[f32]) -> [F32x16; 3] {
+    let from = tracer.trace_lanes(&batch.starts, &batch.velocities);
+    let around = ValuesAround::of(&mut tracer.sampler, field, Site::FACES[batch.axis], &from);
+    let [low, high] = around.range();
+    [around.value(), low, high]
+}
+
+/// The value of a carried field where each face goes, where it is known from wanted faces alone; whether it is.
+#[inline(always)]
+fn returned_body(
+    tracer: &mut Tracer<'_>,
+    batch: &Batch,
+    there: &mut Sampler<'_>,
+    field: &[f32],
+    wanted: &[FaceMask],
+) -> (F32x16, [bool; LANES]) {
+    let to = tracer.trace_lanes(&batch.starts, &batch.velocities);
+    let (values, is_known) =
+        ValuesAround::where_stored(there, field, Site::FACES[batch.axis], &to, wanted, 1 << batch.axis);
+    (values.value(), is_known)
+}
 
 impl Advection<'_> {
     /// The fields `carried`, stored on the rows of the velocity, on faces `wanted` of `rows`; 0 on other faces.
@@ -94,9 +193,10 @@ impl Advection<'_> {
     pub fn carry(&self, carried: &FaceFields<f32>, rows: &CellRows, wanted: &[FaceMask]) -> FaceFields<f32> {
         assert!(carried.iter().all(|field| field.len() == self.velocity.rows().len()));
         assert_eq!(wanted.len(), rows.len());
+        let bounded = self.bounded(carried, rows, wanted);
         match self.scheme {
-            Scheme::SemiLagrangian => self.semi_lagrangian(carried, rows, wanted),
-            Scheme::MacCormack => self.mac_cormack(carried, rows, wanted),
+            Scheme::SemiLagrangian => bounded.map(|field| values(&field)),
+            Scheme::MacCormack => self.corrected(&bounded, carried, rows, wanted),
         }
     }
 
@@ -104,83 +204,117 @@ impl Advection<'_> {
         Tracer::new(self.velocity, self.bounds, step).repeating(self.periods)
     }
 
-    fn semi_lagrangian(&self, carried: &FaceFields<f32>, rows: &CellRows, wanted: &[FaceMask]) -> FaceFields<f32> {
-        let start = || (self.tracer(-self.step), Sampler::new(self.velocity.rows()));
-        rows.tabulate_with(start, |(tracer, sampler), cell, at| {
-            let value = |axis: usize| {
-                if wanted[at] >> axis & 1 == 0 {
-                    return 0.0;
-                }
-                let site = Site::FACES[axis];
-                sampler.value(&carried[axis], site, tracer.trace(site.of(cell)))
-            };
-            let mut value = value;
-            [value(0), value(1), value(2)]
-        })
-    }
-
-    fn mac_cormack(&self, carried: &FaceFields<f32>, rows: &CellRows, wanted: &[FaceMask]) -> FaceFields<f32> {
-        let [x, y, z] = self.bounded(carried, rows, wanted);
-        let first = [&x, &y, &z];
-        let there = first.map(|field| field.iter().map(|[value, ..]| *value).collect::<Vec<_>>());
-        let old = self.velocity.rows();
-        let start = || (self.tracer(self.step), Sampler::new(rows), Sampler::new(old), Around::new(old));
-        rows.tabulate_with(start, |(tracer, new, old, around), cell, at| {
-            if wanted[at] == 0 {
-                return [0.0; 3];
-            }
-            let places = around.places(cell);
-            let mut value = |axis: usize| {
-                if wanted[at] >> axis & 1 == 0 {
-                    return 0.0;
-                }
-                let site = Site::FACES[axis];
-                let [there_value, low, high] = first[axis][at];
-                let known = |corners: &Corners| corners.values(wanted).iter().all(|mask| mask >> axis & 1 == 1);
-                let to = match &places {
-                    Some(places) => tracer.trace_from(site.of(cell), places.at_face(self.velocity.faces(), axis)),
-                    None => tracer.trace(site.of(cell)),
-                };
-                let Some(back) = new.corners(site, to).filter(known) else { return there_value };
-                let before = match &places {
-                    Some(places) => Some(carried[axis][places.own()]),
-                    None => old.corners(site, site.of(cell)).map(|before| before.value(&carried[axis])),
-                };
-                let Some(before) = before else { return there_value };
-                let error = before - back.value(&there[axis]);
-                within(there_value + 0.5 * error, low, high)
-            };
-            [value(0), value(1), value(2)]
-        })
-    }
-
     /// Of each wanted face the value where it came from, and the least and largest value around.
     fn bounded(&self, carried: &FaceFields<f32>, rows: &CellRows, wanted: &[FaceMask]) -> [Vec<Bounded>; 3] {
-        let old = self.velocity.rows();
-        let start = || (self.tracer(-self.step), Sampler::new(old), Around::new(old));
-        rows.tabulate_with(start, |(tracer, sampler, around), cell, at| {
-            if wanted[at] == 0 {
-                return [[0.0; 3]; 3];
+        let path = Path::chosen();
+        rows.tabulate_parts(|spans, first, out| {
+            let mut tracer = self.tracer(-self.step);
+            for (axis, out) in out.into_iter().enumerate() {
+                self.in_batches(spans, wanted, axis, &mut tracer, |tracer, batch| {
+                    let [value, low, high] = self::carried(path, tracer, batch, &carried[axis]);
+                    for lane in 0..batch.len {
+                        out[batch.at[lane] - first] = [value.0[lane], low.0[lane], high.0[lane]];
+                    }
+                });
             }
-            let places = around.places(cell);
-            let mut value = |axis: usize| {
-                if wanted[at] >> axis & 1 == 0 {
-                    return [0.0; 3];
-                }
-                let site = Site::FACES[axis];
-                let from = match &places {
-                    Some(places) => tracer.trace_from(site.of(cell), places.at_face(self.velocity.faces(), axis)),
-                    None => tracer.trace(site.of(cell)),
-                };
-                let Some(corners) = sampler.corners(site, from) else {
-                    return [sampler.value(&carried[axis], site, from); 3];
-                };
-                let around = corners.values(&carried[axis]);
-                let low = around[1..].iter().fold(around[0], |low, v| if *v < low { *v } else { low });
-                let high = around[1..].iter().fold(around[0], |high, v| if *v > high { *v } else { high });
-                [trilinear(around, corners.t), low, high]
-            };
-            [value(0), value(1), value(2)]
         })
     }
+
+    /// The values less half of what they change going there and back.
+    fn corrected(
+        &self,
+        bounded: &[Vec<Bounded>; 3],
+        carried: &FaceFields<f32>,
+        rows: &CellRows,
+        wanted: &[FaceMask],
+    ) -> FaceFields<f32> {
+        let path = Path::chosen();
+        let there = bounded.each_ref().map(|field| values(field));
+        rows.tabulate_parts(|spans, first, out| {
+            let (mut tracer, mut new) = (self.tracer(self.step), Sampler::new(rows));
+            for (axis, out) in out.into_iter().enumerate() {
+                self.in_batches(spans, wanted, axis, &mut tracer, |tracer, batch| {
+                    let (back, is_known) = returned(path, tracer, batch, &mut new, &there[axis], wanted);
+                    for lane in 0..batch.len {
+                        let at = batch.at[lane];
+                        let [value, low, high] = bounded[axis][at];
+                        let before = match batch.before[lane] {
+                            NOWHERE => {
+                                let corners = tracer.sampler.corners(Site::FACES[axis], get(&batch.starts, lane));
+                                corners.map(|corners| corners.value(&carried[axis]))
+                            }
+                            own => Some(carried[axis][own]),
+                        };
+                        out[at - first] = match before.filter(|_| is_known[lane]) {
+                            Some(before) => within(value + 0.5 * (before - back.0[lane]), low, high),
+                            None => value,
+                        };
+                    }
+                });
+            }
+        })
+    }
+
+    /// Calls `f` with the wanted faces across an axis of some spans.
+    fn in_batches<'a>(
+        &'a self,
+        spans: &[PlacedSpan],
+        wanted: &[FaceMask],
+        axis: usize,
+        tracer: &mut Tracer<'a>,
+        mut f: impl FnMut(&mut Tracer<'a>, &Batch),
+    ) {
+        let (site, faces) = (Site::FACES[axis], self.velocity.faces());
+        let mut around = Around::new(self.velocity.rows());
+        let nothing = [F32x16::splat(0.0); 3];
+        let (at, before) = ([0; LANES], [NOWHERE; LANES]);
+        let mut batch = Batch { axis, at, before, starts: nothing, velocities: nothing, len: 0 };
+        for ([y, z], span) in spans {
+            let mut x = span.start;
+            while x < span.end {
+                let (cell, at) = ([x, *y, *z], span.at(x));
+                let rest = &wanted[at..span.at(span.end)];
+                let run = rest.iter().take_while(|wanted| **wanted >> axis & 1 == 1).take(LANES - batch.len).count();
+                if run == 0 {
+                    x += 1;
+                    continue;
+                }
+                let run = match around.places_of_run(cell) {
+                    Some((places, len)) => {
+                        let run = run.min(len);
+                        batch.put(run, cell, [at, places.own()]);
+                        let velocities = batch.velocities.each_mut().map(|lanes| &mut lanes.0[batch.len..][..run]);
+                        places.at_faces(faces, axis, velocities);
+                        run
+                    }
+                    None => {
+                        batch.put(1, cell, [at, NOWHERE]);
+                        let velocity = tracer.sampler.velocity(faces, site.of(cell));
+                        set(&mut batch.velocities, batch.len, velocity);
+                        1
+                    }
+                };
+                x += run as i32;
+                batch.len += run;
+                if batch.len == LANES {
+                    f(tracer, &batch);
+                    batch.len = 0;
+                }
+            }
+        }
+        if batch.len > 0 {
+            // The other lanes go where the first goes; they do not count.
+            for lane in batch.len..LANES {
+                let [start, velocity] = [get(&batch.starts, 0), get(&batch.velocities, 0)];
+                set(&mut batch.starts, lane, start);
+                set(&mut batch.velocities, lane, velocity);
+            }
+            f(tracer, &batch);
+        }
+    }
+}
+
+/// Those of bounded values that were carried.
+fn values(bounded: &[Bounded]) -> Vec<f32> {
+    bounded.iter().map(|[value, ..]| *value).collect()
 }

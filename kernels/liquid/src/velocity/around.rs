@@ -38,6 +38,13 @@ impl<'a> Around<'a> {
         Some(Places(self.base.map(|base| base.wrapping_add(x as u32) as usize)))
     }
 
+    /// The same, and for how many cells from there along x it holds.
+    #[inline(always)]
+    pub(crate) fn places_of_run(&mut self, cell: Cell) -> Option<(Places, usize)> {
+        let places = self.places(cell)?;
+        Some((places, (self.end - cell[0]) as usize))
+    }
+
     #[inline(never)]
     fn find(&mut self, [x, y, z]: Cell) -> Option<()> {
         let mut spans = [RowSpan { start: 0, end: 0, base: 0 }; 7];
@@ -81,26 +88,21 @@ impl Places {
     /// Of the faces along `of` around a low face along `at`, the sum of the two below it and that of the two above.
     #[inline(always)]
     fn sums(&self, field: &[f32], of: usize, at: usize) -> [f32; 2] {
+        let [a, b, c, d] = self.four(of, at);
+        [field[a] + field[b], field[c] + field[d]]
+    }
+
+    /// Where they are: the two below and the two above.
+    #[inline(always)]
+    fn four(&self, of: usize, at: usize) -> [usize; 4] {
         let [own, y_up, y_down, z_up, z_down, yz, zy] = self.0;
-        let ahead = |at: usize| {
-            let pair = &field[at..at + 2];
-            pair[0] + pair[1]
-        };
-        let behind = |at: usize| {
-            let pair = &field[at - 1..at + 1];
-            [pair[0], pair[1]]
-        };
-        let both = |a: usize, b: usize| {
-            let ([a, b], [c, d]) = (behind(a), behind(b));
-            [a + c, b + d]
-        };
         match (of, at) {
-            (1, 0) => both(own, y_up),
-            (2, 0) => both(own, z_up),
-            (0, 1) => [ahead(y_down), ahead(own)],
-            (2, 1) => [field[y_down] + field[yz], field[own] + field[z_up]],
-            (0, _) => [ahead(z_down), ahead(own)],
-            _ => [field[z_down] + field[zy], field[own] + field[y_up]],
+            (1, 0) => [own - 1, y_up - 1, own, y_up],
+            (2, 0) => [own - 1, z_up - 1, own, z_up],
+            (0, 1) => [y_down, y_down + 1, own, own + 1],
+            (2, 1) => [y_down, yz, own, z_up],
+            (0, _) => [z_down, z_down + 1, own, own + 1],
+            _ => [z_down, zy, own, y_up],
         }
     }
 
@@ -112,15 +114,18 @@ impl Places {
         0.5 * (field[above] - field[below])
     }
 
-    /// The velocity in the middle of the low face along an axis.
+    /// The velocity in the middle of the low face along an axis, of this cell and those after it along x: as many as
+    /// `velocities` has room for.
     #[inline(always)]
-    pub(crate) fn at_face(&self, faces: &FaceFields<f32>, axis: usize) -> Vec3 {
-        let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
-        let mut velocity = [0.0; 3];
-        velocity[axis] = faces[axis][self.own()];
-        velocity[a] = self.mean(&faces[a], a, axis);
-        velocity[b] = self.mean(&faces[b], b, axis);
-        velocity
+    pub(crate) fn at_faces(&self, faces: &FaceFields<f32>, axis: usize, velocities: [&mut [f32]; 3]) {
+        let len = velocities[0].len();
+        velocities[axis].copy_from_slice(&faces[axis][self.own()..][..len]);
+        for of in [(axis + 1) % 3, (axis + 2) % 3] {
+            let [a, b, c, d] = self.four(of, axis).map(|at| &faces[of][at..][..len]);
+            for (n, mean) in velocities[of].iter_mut().enumerate() {
+                *mean = 0.25 * ((a[n] + b[n]) + (c[n] + d[n]));
+            }
+        }
     }
 
     /// The velocity in the middle of the cell.
@@ -157,7 +162,13 @@ mod tests {
             assert_eq!(places.at_centre(&faces), velocity.at(&mut sampler, Site::Centre.of(cell)));
             for axis in 0..3 {
                 let middle = Site::FACES[axis].of(cell);
-                assert_eq!(places.at_face(&faces, axis), velocity.at(&mut sampler, middle));
+                let (places, len) = around.places_of_run(cell).unwrap();
+                let mut found = [0, 1, 2].map(|_| vec![0.0; len]);
+                places.at_faces(&faces, axis, found.each_mut().map(|found| &mut found[..]));
+                for n in 0..len {
+                    let middle = Site::FACES[axis].of([cell[0] + n as i32, cell[1], cell[2]]);
+                    assert_eq!([0, 1, 2].map(|of| found[of][n]), velocity.at(&mut sampler, middle));
+                }
                 for of in 0..3 {
                     let (mut below, mut above) = (middle, middle);
                     below[axis] -= 0.5;

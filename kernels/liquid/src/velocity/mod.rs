@@ -6,6 +6,7 @@
 
 mod advect;
 mod around;
+mod batch;
 mod extrapolate;
 mod sampler;
 #[cfg(test)]

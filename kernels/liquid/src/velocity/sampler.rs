@@ -82,8 +82,13 @@ impl Corners {
 #[inline(always)]
 pub fn trilinear(v: [f32; 8], [x, y, z]: Vec3) -> f32 {
     let (low, high) = ([v[0], v[1], v[4], v[5]], [v[2], v[3], v[6], v[7]]);
-    let rows: [f32; 4] = std::array::from_fn(|n| low[n] + (high[n] - low[n]) * y);
-    let ends: [f32; 2] = std::array::from_fn(|n| rows[n] + (rows[n + 2] - rows[n]) * z);
+    let (mut rows, mut ends) = ([0.0; 4], [0.0; 2]);
+    for n in 0..4 {
+        rows[n] = low[n] + (high[n] - low[n]) * y;
+    }
+    for n in 0..2 {
+        ends[n] = rows[n] + (rows[n + 2] - rows[n]) * z;
+    }
     ends[0] + (ends[1] - ends[0]) * x
 }
 
@@ -124,14 +129,24 @@ impl<'a> Sampler<'a> {
     }
 
     #[inline(always)]
-    fn corners_of(&mut self, ([x, y, z], t): (Cell, Vec3)) -> Option<Corners> {
+    fn corners_of(&mut self, (cell, t): (Cell, Vec3)) -> Option<Corners> {
+        Some(Corners { at: self.places(cell)?, t })
+    }
+
+    /// Where the first of two values along x is, given the cell of the first corner; as [`Corners`] has it.
+    #[inline(always)]
+    pub(super) fn places(&mut self, [x, y, z]: Cell) -> Option<[u32; 4]> {
         let slot = (y & 3 | (z & 3) << 2) as usize;
         let mut window = &self.windows[slot];
         if window.row != [y, z] || x < window.start || x >= window.end {
             self.windows[slot] = self.window([x, y, z])?;
             window = &self.windows[slot];
         }
-        Some(Corners { at: window.base.map(|base| base.wrapping_add(x as u32)), t })
+        let mut places = window.base;
+        for place in &mut places {
+            *place = place.wrapping_add(x as u32);
+        }
+        Some(places)
     }
 
     /// The value of `field` at `point`. Where not all corners are stored, the mean of those that are, weighted as they
@@ -182,7 +197,7 @@ impl<'a> Sampler<'a> {
     }
 
     #[cold]
-    fn value_beside(&mut self, field: &[f32], site: Site, point: Vec3) -> f32 {
+    pub(super) fn value_beside(&mut self, field: &[f32], site: Site, point: Vec3) -> f32 {
         let (mut sum, mut weights) = (0.0, 0.0);
         for (at, weight) in self.stored_beside(site, point).into_iter().flatten() {
             sum += weight * field[at];
@@ -267,7 +282,7 @@ fn split(site: Site, point: Vec3) -> (Cell, Vec3) {
 
 /// The same along one axis.
 #[inline(always)]
-fn split_along(x: f32, offset: f32) -> (i32, f32) {
+pub(super) fn split_along(x: f32, offset: f32) -> (i32, f32) {
     let p = within(x, -FARTHEST, FARTHEST) - offset;
     // A whole p may take the cell below, with t = 1.
     let sum = (p - 0.5) + WHOLE;

@@ -101,9 +101,7 @@ impl Level {
 
     /// The mass of a face, and the viscosities around it.
     fn own_diagonal(&self, run: &Run, n: usize, axis: usize) -> f64 {
-        let at = run.at as usize + n;
-        let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
-        let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
+        let (at, below, above) = run.neighbours(n);
         let [below, above] = [below, above].map(|near| near.map(|at| self.images.home(at)));
         let (side, other) = ((axis + 1) % 3, (axis + 2) % 3);
         let terms = [

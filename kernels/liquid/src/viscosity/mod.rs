@@ -392,8 +392,7 @@ fn resistance(level: &Level, flow: &Flow, pressure: &PressureSolver) -> Vec<f64>
     pressure.stencil().update([&mut out], |runs, first, [out]| {
         for run in runs {
             for n in 0..run.len as usize {
-                let at = run.at as usize + n;
-                let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
+                let (at, _, above) = run.neighbours(n);
                 let faces = (0..3).flat_map(|axis| [(axis, at), (axis, above[axis])]);
                 let (mut sum, mut count) = (0.0, 0.0);
                 for yielding in faces.filter_map(|(axis, face)| yielding(axis, face)) {

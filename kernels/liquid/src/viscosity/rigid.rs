@@ -307,9 +307,7 @@ fn components(level: &Level, threshold: f32) -> Vec<Part> {
     let mut crossing = Vec::new();
     for run in level.stencil.runs() {
         for n in 0..run.len as usize {
-            let at = run.at as usize + n;
-            let below = [at - 1, run.y[0] as usize + n, run.z[0] as usize + n];
-            let above = [at + 1, run.y[1] as usize + n, run.z[1] as usize + n];
+            let (at, below, above) = run.neighbours(n);
             let mut join = |faces: &[(usize, usize)]| {
                 let mut free = faces.iter().filter(|(axis, at)| is_free(*axis, *at));
                 if let Some((axis, first)) = free.next() {

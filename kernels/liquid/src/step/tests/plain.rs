@@ -99,15 +99,15 @@ fn distances(rows: &CellRows, phi: &[f32]) -> Vec<f32> {
     let stencil = Stencil::around(rows.clone(), 1);
     let signed = stencil.rows().resampled(rows, phi, f32::NAN);
     let neighbours = |run: &Run, n: usize| {
-        let at = run.at as usize + n;
-        [at - 1, at + 1, run.y[0] as usize + n, run.y[1] as usize + n, run.z[0] as usize + n, run.z[1] as usize + n]
+        let (_, below, above) = run.neighbours(n);
+        [0, 1, 2].map(|axis| [below[axis], above[axis]])
     };
     let mut distance = vec![BAND; signed.len()];
     let mut kept = vec![0_u8; signed.len()];
     for run in stencil.runs() {
         for (n, at) in run.range().enumerate() {
             // NaN, where nothing is stored, compares false.
-            if neighbours(run, n).iter().any(|near| signed[*near] * signed[at] <= 0.0) {
+            if neighbours(run, n).as_flattened().iter().any(|near| signed[*near] * signed[at] <= 0.0) {
                 (distance[at], kept[at]) = (signed[at].abs().min(1.0), 1);
             }
         }
@@ -117,8 +117,8 @@ fn distances(rows: &CellRows, phi: &[f32]) -> Vec<f32> {
         stencil.update([&mut next], |runs, first, [next]| {
             for run in runs {
                 for (n, at) in run.range().enumerate().filter(|(_, at)| kept[*at] == 0) {
-                    let [a, b, c, d, e, f] = neighbours(run, n).map(|near| distance[near]);
-                    next[at - first] = distance[at].min(eikonal([a.min(b), c.min(d), e.min(f)]));
+                    let least = neighbours(run, n).map(|[below, above]| distance[below].min(distance[above]));
+                    next[at - first] = distance[at].min(eikonal(least));
                 }
             }
         });
