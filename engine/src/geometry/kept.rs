@@ -34,7 +34,9 @@ impl Component {
             None => Arc::new(make()?),
         };
         let mut cached = cached();
-        cached.retain(|(cached_key, _)| *cached_key != key);
+        // If another thread has made it meanwhile, all use that one.
+        let now = cached.iter().position(|(cached_key, _)| *cached_key == key);
+        let value = now.map_or(value, |at| cached.remove(at).1);
         if cached.len() == KEPT {
             cached.remove(0);
         }
