@@ -74,6 +74,17 @@ mod tests {
     }
 
     #[test]
+    fn a_value_made_meanwhile_is_shared() {
+        let part = Component::points(vec![[0.0; 3]]);
+        let slower = || {
+            assert_eq!(*part.kept(7_u8, || Ok(1)).unwrap(), 1);
+            Ok(2)
+        };
+        assert_eq!(*part.kept(7_u8, slower).unwrap(), 1);
+        assert_eq!(*part.kept(7_u8, || Ok(3)).unwrap(), 1);
+    }
+
+    #[test]
     fn a_failure_is_not_kept() {
         let part = Component::points(vec![[0.0; 3]]);
         assert!(part.kept(7_u8, || Err::<(), _>(Error::refused("no"))).is_err());
