@@ -20,9 +20,9 @@
 //!   towards rest, up to its first pose that crosses nothing.
 //! * `offset_scale` only raises segments that would lie lower: wind may lift fur off the skin.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-use curves::collide::{Collide, ContactMethod, SkinMesh, at_rest, collide};
+use curves::collide::{AtRest, Collide, ContactMethod, SkinMesh, collide};
 use engine::prelude::*;
 use numerics::tree::TriangleTree;
 
@@ -202,7 +202,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     curves.set(P, found.points)?;
     for (attr, values) in OF_CURVES.into_iter().zip(found.of_curves) {
         if cx.wants(attr) {
-            curves.set(attr, values)?;
+            curves.set_column(Owner::Element, attr.name, values)?;
         }
     }
     Ok(OUT.with(curves))
@@ -215,7 +215,14 @@ const OF_CURVES: [Attr<i32>; 3] = [UNFREED_SEGMENTS, BLENDED_CURVE, LOW_ROOT];
 struct Found {
     points: Vec<[f32; 3]>,
     /// The values of [`OF_CURVES`].
-    of_curves: [Vec<i32>; 3],
+    of_curves: [Column; 3],
+}
+
+/// What depends on curves and obstacles at rest alone. Frames that need it first at the same time find it together.
+struct KeptAtRest {
+    curves: AtRest,
+    /// [`LOW_ROOT`], one array for all frames.
+    low_root: OnceLock<Column>,
 }
 
 /// The curves of a group collided; the others as they are, with 0 of everything.
@@ -229,9 +236,12 @@ fn collided_of(cx: &Cx, group: &Group, curves: &Component, rest: &Component) -> 
         points[curves.runs().range(*curve as usize)].copy_from_slice(&part_found.points[own]);
     }
     let of_curves = part_found.of_curves.map(|own| {
+        let own = i32::array(&own).map_or_else(Arc::default, Arc::clone);
         let mut all = vec![0; curves.element_count()];
-        chosen.iter().zip(own).for_each(|(curve, value)| all[*curve as usize] = value);
-        all
+        for (curve, value) in chosen.iter().zip(own.as_slice()) {
+            all[*curve as usize] = *value;
+        }
+        Column::new(all)
     });
     Ok(Found { points, of_curves })
 }
@@ -275,8 +285,9 @@ fn collided(cx: &Cx, curves: &Component, rest: &Component) -> Result<Found> {
         offsets: offset_root.mask.map_or_else(Vec::new, at_root),
         lofts: how.loft.value > 0.0,
     };
-    let at_rest = rest.kept(still, || Ok(at_rest(starts, rest.positions(), &how)))?;
-    how.at_rest = Some(&at_rest);
+    let of = || KeptAtRest { curves: AtRest::of(curves.element_count()), low_root: OnceLock::new() };
+    let at_rest = rest.kept(still, || Ok(of()))?;
+    how.at_rest = Some(&at_rest.curves);
     let collided = collide(starts, rest.positions(), curves.positions(), &how);
     cx.publish(CROSSINGS_LEFT, collided.crossings_left as f64);
     cx.publish(UNFREED, collided.unfreed_segments as f64);
@@ -286,8 +297,16 @@ fn collided(cx: &Cx, curves: &Component, rest: &Component) -> Result<Found> {
     cx.publish(CONTACTS, collided.contacts as f64);
     cx.publish(DEEPEST, collided.deepest_overlap);
     cx.publish(LENGTH_ERROR, collided.length_error);
-    let low = at_rest.is_low().map(i32::from).collect();
-    Ok(Found { points: collided.points, of_curves: [collided.crossings, collided.blended, low] })
+    let low_root = match at_rest.low_root.get() {
+        Some(low_root) => low_root.clone(),
+        None => {
+            let low_root = Column::new(at_rest.curves.is_low().map(i32::from).collect());
+            let _ = at_rest.low_root.set(low_root.clone());
+            low_root
+        }
+    };
+    let of_curves = [Column::new(collided.crossings), Column::new(collided.blended), low_root];
+    Ok(Found { points: collided.points, of_curves })
 }
 
 /// Everything that the test of rest curves depends on besides the curves; equal if the trees are the same objects.

@@ -205,29 +205,28 @@ fn lost_at(cv: usize, shielded: f32, amount: &Masked<'_, f32>) -> f32 {
     (shielded * amount.at(cv)).clamp(0.0, 1.0)
 }
 
-/// The share of the wind that each CV loses.
-fn shelter(curves: &Component, shielded: &[f32], amount: Masked<'_, f32>) -> Vec<f32> {
-    let mut lost = Vec::with_capacity(curves.point_count());
+/// A number of each CV, made of the share of the wind that it loses.
+fn of_lost(curves: &Component, shielded: &[f32], amount: Masked<'_, f32>, number: impl Fn(f32) -> f32) -> Vec<f32> {
+    let mut numbers = Vec::with_capacity(curves.point_count());
     for (cvs, shielded) in curves.runs().ranges().zip(shielded) {
         match amount.mask {
-            None => lost.resize(cvs.end, lost_at(cvs.start, *shielded, &amount)),
-            Some(_) => lost.extend(cvs.map(|cv| lost_at(cv, *shielded, &amount))),
+            None => numbers.resize(cvs.end, number(lost_at(cvs.start, *shielded, &amount))),
+            Some(_) => numbers.extend(cvs.map(|cv| number(lost_at(cv, *shielded, &amount)))),
         }
     }
-    lost
+    numbers
+}
+
+/// The share of the wind that each CV loses.
+fn shelter(curves: &Component, shielded: &[f32], amount: Masked<'_, f32>) -> Vec<f32> {
+    of_lost(curves, shielded, amount, |lost| lost)
 }
 
 /// The envelope, 1 if missing, less the share that each CV loses.
 fn scaled(curves: &Component, shielded: &[f32], amount: Masked<'_, f32>) -> Vec<f32> {
-    let mut envelope = curves.get(ENVELOPE).map_or_else(|| vec![1.0; curves.point_count()], <[f32]>::to_vec);
-    for (cvs, shielded) in curves.runs().ranges().zip(shielded) {
-        if amount.mask.is_none() {
-            let left = 1.0 - lost_at(cvs.start, *shielded, &amount);
-            envelope[cvs].iter_mut().for_each(|envelope| *envelope *= left);
-        } else {
-            let rows = envelope[cvs.clone()].iter_mut().zip(cvs);
-            rows.for_each(|(envelope, cv)| *envelope *= 1.0 - lost_at(cv, *shielded, &amount));
-        }
+    let mut envelope = of_lost(curves, shielded, amount, |lost| 1.0 - lost);
+    if let Some(incoming) = curves.get(ENVELOPE) {
+        envelope.iter_mut().zip(incoming).for_each(|(left, envelope)| *left *= envelope);
     }
     envelope
 }

@@ -34,7 +34,9 @@ impl Component {
             None => Arc::new(make()?),
         };
         let mut cached = cached();
-        cached.retain(|(cached_key, _)| *cached_key != key);
+        // If another thread has made it meanwhile, all use that one.
+        let now = cached.iter().position(|(cached_key, _)| *cached_key == key);
+        let value = now.map_or(value, |at| cached.remove(at).1);
         if cached.len() == KEPT {
             cached.remove(0);
         }
@@ -69,6 +71,17 @@ mod tests {
         assert_eq!(cached(0, 99), 0, "used again");
         assert_eq!(cached(KEPT, KEPT), KEPT);
         assert_eq!((cached(0, 99), cached(1, 99)), (0, 99));
+    }
+
+    #[test]
+    fn a_value_made_meanwhile_is_shared() {
+        let part = Component::points(vec![[0.0; 3]]);
+        let slower = || {
+            assert_eq!(*part.kept(7_u8, || Ok(1)).unwrap(), 1);
+            Ok(2)
+        };
+        assert_eq!(*part.kept(7_u8, slower).unwrap(), 1);
+        assert_eq!(*part.kept(7_u8, || Ok(3)).unwrap(), 1);
     }
 
     #[test]

@@ -157,22 +157,18 @@ impl Hair<'_> {
         nearby: &mut Nearby<'t>,
         reached: &mut Reached,
     ) -> DVec3 {
-        let turn = |segment: &Segment, nearby: &mut Nearby<'t>| match way_out {
-            None => segment.turn(how.method, how.obstacles, nearby),
-            Some(way_out) => segment.turn_coherently(how.method, way_out, how.obstacles, nearby),
-        };
         let mut turned = match self.half_space {
             Some(half_space) if half_space.frees(&(to_f64(self.rest[0]) + self.shift), segment) => {
                 Turned { direction: segment.to, met: false, clear: true }
             }
-            _ => turn(segment, nearby),
+            _ => turned_by(how, segment, way_out, nearby),
         };
         let mut end = segment.end(&turned.direction);
         if !turned.met && may_keep_goal && self.out[k] == self.goal[k] {
             end = self.goal[k + 1];
         }
         if !turned.clear && first_crossing(nearby, segment.start(&turned.direction), end).is_some() {
-            turned = turn(&segment.wary(), nearby);
+            turned = turned_by(how, &segment.wary(), way_out, nearby);
             end = segment.end(&turned.direction);
             if let Some(crossing) = first_crossing(nearby, segment.start(&turned.direction), end) {
                 reached.unfreed_segments += 1;
@@ -297,6 +293,20 @@ impl Hair<'_> {
             };
         }
         true
+    }
+}
+
+/// How a segment's turn ends. Not a closure: one as large is not inlined, and compiled without the path's instructions.
+#[inline(always)]
+fn turned_by<'t>(
+    how: &Collide<'t>,
+    segment: &Segment,
+    way_out: Option<&WayOut<'t>>,
+    nearby: &mut Nearby<'t>,
+) -> Turned {
+    match way_out {
+        None => segment.turn(how.method, how.obstacles, nearby),
+        Some(way_out) => segment.turn_coherently(how.method, way_out, how.obstacles, nearby),
     }
 }
 

@@ -26,14 +26,12 @@ mod triangle_filter;
 
 use coherence::Ground;
 use hair::{Hair, Scratch};
-use half_space::HalfSpace;
 pub use keep_out::{Clearance, KeepOut, KeptOut, keep_out};
 use numerics::masked::Masked;
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
 use numerics::tree::TriangleTree;
 use numerics::vector::{DVec3, Vec3};
-use rest::at_rest_on;
 pub use rest::{AtRest, at_rest};
 pub use skin::{SkinMesh, SkinSurface, normals};
 use std::ops::Range;
@@ -69,7 +67,7 @@ pub struct Collide<'a> {
     /// Share of its height at rest, above the root's tangent plane, that a CV's goal keeps, 0..1; scaled by
     /// 1 − `coherence`, and not used with `offset_scale`; a mask has one value for each CV.
     pub loft: Masked<'a, f64>,
-    /// The result of [`at_rest`] for the same curves, if known.
+    /// What is known of the same curves at rest.
     pub at_rest: Option<&'a AtRest>,
     /// Fraction of each segment's collision response that is kept, 0..1.
     pub blend: Masked<'a, f32>,
@@ -178,17 +176,19 @@ pub fn collide(starts: &[u32], rest: &[Vec3], goal: &[Vec3], how: &Collide<'_>) 
 /// # Panics
 /// As [`collide()`].
 pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how: &Collide<'_>) -> Collided {
-    let computed;
+    let unknown;
     let at_rest = match how.at_rest {
         Some(at_rest) => at_rest,
         None => {
-            computed = at_rest_on(path, starts, rest, how);
-            &computed
+            unknown = AtRest::of(starts.len().saturating_sub(1));
+            &unknown
         }
     };
+    at_rest.find_on(path, starts, rest, how);
+    at_rest.used(path, starts, rest, how);
     let is_skin = |tree: &&TriangleTree| how.skin.as_ref().is_some_and(|skin| std::ptr::eq(*tree, skin.tree));
     let others: Vec<&TriangleTree> = how.obstacles.iter().filter(|tree| !is_skin(tree)).copied().collect();
-    let known = Known { at_rest, half_spaces: at_rest.used(path, starts, rest, how), others: &others };
+    let known = Known { at_rest, others: &others };
     let curves = starts.len().saturating_sub(1);
     let (mut points, mut crossings, mut blended) = (vec![[0.0; 3]; goal.len()], vec![0; curves], vec![0; curves]);
     let mut tasks = Vec::new();
@@ -227,8 +227,6 @@ pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how:
 #[derive(Clone, Copy)]
 struct Known<'a> {
     at_rest: &'a AtRest,
-    /// One for each curve, or none.
-    half_spaces: &'a [HalfSpace],
     /// Obstacles besides the skin.
     others: &'a [&'a TriangleTree],
 }
@@ -257,7 +255,7 @@ fn task(
     starts: &[u32],
     [rest, goal]: [&[Vec3]; 2],
     how: &Collide<'_>,
-    Known { at_rest, half_spaces, others }: Known<'_>,
+    Known { at_rest, others }: Known<'_>,
     out: Written<'_>,
 ) -> Reached {
     let mut scratch = Scratch::default();
@@ -268,7 +266,7 @@ fn task(
         let mut hair = Hair {
             first: cvs.start,
             shift: at_rest.shift(curve),
-            half_space: half_spaces.get(curve),
+            half_space: at_rest.half_space(curve),
             around: at_rest.around(curve),
             rest: &rest[cvs.clone()],
             goal: &goal[cvs.clone()],

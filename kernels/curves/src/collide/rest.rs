@@ -9,110 +9,220 @@ use numerics::parallel;
 use numerics::simd::{Path, kernel};
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// Number of successive segments that share one query of the trees.
 const GATHERED_SEGMENTS: usize = 6;
 
-/// Number of curves in a task.
-const TASK_CURVES: usize = 64;
+/// Number of curves that are examined together.
+const BATCH_CURVES: usize = 64;
 
-/// Everything that depends only on curves, obstacles and skin at rest, not on the wind; see [`at_rest`].
-#[derive(Debug, Default)]
+/// Everything that depends only on curves, obstacles and skin at rest, not on the wind: on `obstacles`, `skin` and
+/// `offset_root` of [`Collide`], and on whether its `loft` is 0. Keep it and pass it in [`Collide::at_rest`] while these
+/// and the curves do not change.
+///
+/// It is found at its first use. Threads that use it at the same time share that work: none waits for another, and little
+/// is found twice.
+#[derive(Debug)]
 pub struct AtRest {
-    curves: Vec<Grown>,
+    batches: Vec<Batch>,
     /// How often it was used.
     uses: AtomicU32,
+}
+
+/// What is known of some curves.
+#[derive(Debug, Default)]
+struct Batch {
+    is_claimed: AtomicBool,
+    grown: OnceLock<Grown>,
     /// Found at the second use: on a skin that moves in each frame there is none, and they would cost more than they
     /// save.
     half_spaces: OnceLock<Vec<HalfSpace>>,
+    half_spaces_are_claimed: AtomicBool,
 }
 
-/// A curve at rest.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Grown {
-    /// Its displacement, which puts its root `offset_root` above the skin.
-    pub(super) shift: DVec3,
-    /// Whether it crosses something, displaced.
-    pub(super) inside: bool,
-    /// Whether its root is nearer to the skin than that.
-    pub(super) low: bool,
-    /// The skin around its root; none without `loft`.
-    pub(super) around: Option<RootSurface>,
+/// Curves at rest.
+#[derive(Debug, Default)]
+struct Grown {
+    /// Their displacements, which put their roots `offset_root` above the skin.
+    shifts: Vec<DVec3>,
+    /// The skin around their roots; empty without `loft`.
+    around: Vec<Option<RootSurface>>,
+    /// Whether their roots are nearer to the skin than `offset_root`.
+    is_low: Vec<bool>,
+    /// Number of curves that cross something, displaced.
+    inside: u64,
 }
 
-/// Examines curves at rest. The result depends on `obstacles`, `skin` and `offset_root` of `how`, and on whether its
-/// `loft` is 0: keep it and pass it in [`Collide::at_rest`] while these and the curves do not change.
+impl AtRest {
+    /// Of this many curves, of which nothing is known yet.
+    pub fn of(curves: usize) -> Self {
+        let batches = (0..curves.div_ceil(BATCH_CURVES)).map(|_| Batch::default()).collect();
+        Self { batches, uses: AtomicU32::new(0) }
+    }
+
+    /// Examines the curves as far as that has not been done.
+    ///
+    /// # Panics
+    /// If there are more curves than in [`AtRest::of`], or as [`super::collide()`].
+    pub fn find(&self, starts: &[u32], rest: &[Vec3], how: &Collide<'_>) {
+        self.find_on(Path::chosen(), starts, rest, how);
+    }
+
+    pub(super) fn find_on(&self, path: Path, starts: &[u32], rest: &[Vec3], how: &Collide<'_>) {
+        if self.batches.iter().all(|batch| batch.grown.get().is_some()) {
+            return;
+        }
+        let grown = |n: usize| {
+            let mut grown = Grown::default();
+            grow(path, ends_of(n, starts), rest, how, &mut grown);
+            grown
+        };
+        parallel::for_each(&self.batches, |n, batch| {
+            if !batch.is_claimed.swap(true, Ordering::Relaxed) {
+                let _ = batch.grown.set(grown(n));
+            }
+        });
+        // Of each thread beside this one, the batch that it is at.
+        for (n, batch) in self.batches.iter().enumerate() {
+            if batch.grown.get().is_none() {
+                let _ = batch.grown.set(grown(n));
+            }
+        }
+    }
+
+    /// Counts a use, and finds half-spaces from the second one on. What another use is finding at the same time stays
+    /// unknown to this one.
+    pub(super) fn used(&self, path: Path, starts: &[u32], rest: &[Vec3], how: &Collide<'_>) {
+        let is_first = self.uses.fetch_add(1, Ordering::Relaxed) == 0;
+        if is_first || how.skin.is_none() || self.batches.iter().all(|batch| batch.half_spaces.get().is_some()) {
+            return;
+        }
+        parallel::for_each(&self.batches, |n, batch| {
+            if let Some(grown) = batch.grown.get()
+                && !batch.half_spaces_are_claimed.swap(true, Ordering::Relaxed)
+            {
+                let mut found = vec![HalfSpace::default(); grown.shifts.len()];
+                look_up(path, ends_of(n, starts), rest, how, &grown.shifts, &mut found);
+                let _ = batch.half_spaces.set(found);
+            }
+        });
+    }
+
+    /// What is known of a curve, and its index there.
+    #[inline(always)]
+    fn batch(&self, curve: usize) -> (&Batch, usize) {
+        (&self.batches[curve / BATCH_CURVES], curve % BATCH_CURVES)
+    }
+
+    fn grown(&self) -> impl Iterator<Item = &Grown> {
+        self.batches.iter().filter_map(|batch| batch.grown.get())
+    }
+
+    /// Number of curves that cross something.
+    pub(super) fn inside(&self) -> u64 {
+        self.grown().map(|grown| grown.inside).sum()
+    }
+
+    /// Number of half-spaces found so far that may free something.
+    #[cfg(test)]
+    pub(super) fn half_spaces_found(&self) -> usize {
+        let found = self.batches.iter().filter_map(|batch| batch.half_spaces.get());
+        found.flatten().filter(|found| **found != HalfSpace::default()).count()
+    }
+
+    /// Whether the root of each curve is nearer to the skin than the root offset, as far as that is known.
+    pub fn is_low(&self) -> impl Iterator<Item = bool> {
+        self.grown().flat_map(|grown| &grown.is_low).copied()
+    }
+
+    /// Number of roots that are nearer to the skin than the root offset.
+    pub(super) fn low_roots(&self) -> u64 {
+        self.grown().map(|grown| grown.is_low.iter().filter(|is_low| **is_low).count() as u64).sum()
+    }
+
+    /// The skin around a curve's root; none where it is not known.
+    #[inline]
+    pub(super) fn around(&self, curve: usize) -> Option<RootSurface> {
+        let (batch, n) = self.batch(curve);
+        batch.grown.get()?.around.get(n).copied().flatten()
+    }
+
+    /// The displacement of a curve.
+    #[inline]
+    pub(super) fn shift(&self, curve: usize) -> DVec3 {
+        let (batch, n) = self.batch(curve);
+        batch.grown.get().map_or_else(DVec3::zeros, |grown| grown.shifts[n])
+    }
+
+    /// The half-space of a curve, if it is known.
+    #[inline]
+    pub(super) fn half_space(&self, curve: usize) -> Option<&HalfSpace> {
+        let (batch, n) = self.batch(curve);
+        batch.half_spaces.get()?.get(n)
+    }
+}
+
+/// The first CVs of the curves of a batch, and the end of the last.
+fn ends_of(batch: usize, starts: &[u32]) -> &[u32] {
+    let first = batch * BATCH_CURVES;
+    &starts[first..starts.len().min(first + BATCH_CURVES + 1)]
+}
+
+/// Examines curves at rest at once; see [`AtRest`].
 ///
 /// # Panics
 /// As [`super::collide()`].
 pub fn at_rest(starts: &[u32], rest: &[Vec3], how: &Collide<'_>) -> AtRest {
-    at_rest_on(Path::chosen(), starts, rest, how)
-}
-
-pub(super) fn at_rest_on(path: Path, starts: &[u32], rest: &[Vec3], how: &Collide<'_>) -> AtRest {
-    let mut curves = vec![Grown::default(); starts.len().saturating_sub(1)];
-    parallel::for_each(curves.chunks_mut(TASK_CURVES), |task, grown| {
-        let first = task * TASK_CURVES;
-        grow(path, &starts[first..=first + grown.len()], rest, how, grown);
-    });
-    AtRest { curves, ..AtRest::default() }
+    let found = AtRest::of(starts.len().saturating_sub(1));
+    found.find(starts, rest, how);
+    found
 }
 
 kernel! {
-    fn grow(starts: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut [Grown]) = grow_task;
+    fn grow(ends: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut Grown) = grow_task;
 }
 
 #[inline(always)]
-fn grow_task(starts: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut [Grown]) {
+fn grow_task(ends: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut Grown) {
     let mut nearby = Nearby::default();
-    for (ends, grown) in starts.windows(2).zip(grown) {
+    for ends in ends.windows(2) {
         let cvs = &rest[ends[0] as usize..ends[1] as usize];
-        if cvs.len() < 2 || cvs.as_flattened().iter().any(|x| !x.is_finite()) {
-            continue;
-        }
-        if let Some(skin) = &how.skin {
+        let is_whole = cvs.len() >= 2 && cvs.as_flattened().iter().all(|x| x.is_finite());
+        let (mut shift, mut is_low, mut around) = (DVec3::zeros(), false, None);
+        if let Some(skin) = how.skin.as_ref().filter(|_| is_whole) {
             let lifted = skin.lift(cvs[0], how.offset_root_at(ends[0] as usize));
-            (grown.shift, grown.low) = (lifted.shift, lifted.low);
+            (shift, is_low) = (lifted.shift, lifted.low);
             if how.loft.value > 0.0 {
-                grown.around = RootSurface::of(skin, &to_f64(cvs[0]), SAME_SIDE);
+                around = RootSurface::of(skin, &to_f64(cvs[0]), SAME_SIDE);
             }
         }
-        grown.inside = crosses_any(cvs, &grown.shift, how, &mut nearby);
+        grown.shifts.push(shift);
+        grown.is_low.push(is_low);
+        if how.loft.value > 0.0 {
+            grown.around.push(around);
+        }
+        grown.inside += u64::from(is_whole && crosses_any(cvs, &shift, how, &mut nearby));
     }
 }
 
 kernel! {
     fn look_up(
-        first: usize,
-        starts: &[u32],
+        ends: &[u32],
         rest: &[Vec3],
         how: &Collide<'_>,
-        grown: &[Grown],
+        shifts: &[DVec3],
         out: &mut [HalfSpace],
     ) = look_up_task;
 }
 
 #[inline(always)]
-fn look_up_task(
-    first: usize,
-    starts: &[u32],
-    rest: &[Vec3],
-    how: &Collide<'_>,
-    grown: &[Grown],
-    out: &mut [HalfSpace],
-) {
+fn look_up_task(ends: &[u32], rest: &[Vec3], how: &Collide<'_>, shifts: &[DVec3], out: &mut [HalfSpace]) {
     for (k, out) in out.iter_mut().enumerate() {
-        let cvs = starts[first + k] as usize..starts[first + k + 1] as usize;
+        let cvs = ends[k] as usize..ends[k + 1] as usize;
         if cvs.len() >= 2 && rest[cvs.clone()].as_flattened().iter().all(|x| x.is_finite()) {
             let width = cvs.clone().fold(0.0, |most: f32, cv| most.max(how.width.at(cv)));
-            *out = HalfSpace::of(
-                &rest[cvs.clone()],
-                &grown[first + k].shift,
-                f64::from(width),
-                how.gap_at(cvs.start),
-                how,
-            );
+            *out = HalfSpace::of(&rest[cvs.clone()], &shifts[k], f64::from(width), how.gap_at(cvs.start), how);
         }
     }
 }
@@ -138,51 +248,4 @@ fn crosses_any<'t>(cvs: &[Vec3], shift: &DVec3, how: &Collide<'t>, nearby: &mut 
         }
     }
     false
-}
-
-impl AtRest {
-    /// Number of curves that cross something.
-    pub(super) fn inside(&self) -> u64 {
-        self.curves.iter().map(|curve| u64::from(curve.inside)).sum()
-    }
-
-    /// Counts a use, and finds half-spaces at the second one. Uses beside it get none, instead of waiting for a thread
-    /// that may be waiting for them.
-    pub(super) fn used(&self, path: Path, starts: &[u32], rest: &[Vec3], how: &Collide<'_>) -> &[HalfSpace] {
-        if self.uses.fetch_add(1, Ordering::Relaxed) == 1 && how.skin.is_some() {
-            let mut found = vec![HalfSpace::default(); self.curves.len()];
-            parallel::for_each(found.chunks_mut(TASK_CURVES), |task, out| {
-                look_up(path, task * TASK_CURVES, starts, rest, how, &self.curves, out);
-            });
-            let _ = self.half_spaces.set(found);
-        }
-        self.half_spaces.get().map_or(&[], Vec::as_slice)
-    }
-
-    /// Number of half-spaces found so far that may free something.
-    #[cfg(test)]
-    pub(super) fn half_spaces_found(&self) -> usize {
-        let found = self.half_spaces.get().map_or(&[][..], Vec::as_slice);
-        found.iter().filter(|found| **found != HalfSpace::default()).count()
-    }
-
-    /// Whether the root of each curve is nearer to the skin than the root offset.
-    pub fn is_low(&self) -> impl ExactSizeIterator<Item = bool> {
-        self.curves.iter().map(|curve| curve.low)
-    }
-
-    /// Number of roots that are nearer to the skin than the root offset.
-    pub(super) fn low_roots(&self) -> u64 {
-        self.curves.iter().map(|curve| u64::from(curve.low)).sum()
-    }
-
-    /// The skin around a curve's root; none where it is not known.
-    pub(super) fn around(&self, curve: usize) -> Option<RootSurface> {
-        self.curves[curve].around
-    }
-
-    /// The displacement of a curve.
-    pub(super) fn shift(&self, curve: usize) -> DVec3 {
-        self.curves[curve].shift
-    }
 }

@@ -170,8 +170,10 @@ pub fn shield_on(
     }
     let look = |views: &Views, covered: &mut [f32]| {
         let tasks = covered.chunks_mut(TASK_GROUPS * LANES).zip(views.sorted().chunks(TASK_GROUPS * LANES));
-        parallel::for_each(tasks, |_, (covered, views)| {
-            for (covered, views) in covered.chunks_mut(LANES).zip(views.chunks(LANES)) {
+        parallel::for_each(tasks, |_, (covered, cvs)| {
+            for (covered, cvs) in covered.chunks_mut(LANES).zip(cvs.chunks(LANES)) {
+                let group = views.group(cvs);
+                let views = &group[..cvs.len()];
                 match fade {
                     None if shield.cone > 0.0 => cone::cover(path, &obstacles, views, shield.cone, covered),
                     Some(fade) if shield.cone > 0.0 => {
@@ -186,7 +188,7 @@ pub fn shield_on(
     let mut covered = Vec::new();
     loop {
         covered.clear();
-        covered.resize(views.sorted().len(), 0.0);
+        covered.resize(views.len(), 0.0);
         look(&views, &mut covered);
         let (mine, rest) = left.split_at_mut(views.curves());
         parallel::fill(mine, TASK_CURVES, |curve| share(views.of_curve(curve), &covered));

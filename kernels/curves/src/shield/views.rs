@@ -1,11 +1,13 @@
 //! The CVs in the frame, sorted so that sixteen successive ones see nearly the same triangles.
 //!
 //! Curves may lie in memory in any order and may be long, so CVs are sorted instead of curves: into the cells of a grid
-//! across the wind, along a Z-order curve, in two passes.
+//! across the wind, in two layers along it, along a Hilbert curve, in two passes.
 
 use super::Shield;
 use super::frame::{Frame, Gap};
+use numerics::lanes::LANES;
 use numerics::parallel;
+use numerics::simd::{Path, kernel};
 use numerics::vector::Vec3;
 
 /// A CV, from which a ray or cone is cast upwind.
@@ -19,10 +21,13 @@ pub(super) struct View {
 
 /// The CVs of some curves.
 pub(super) struct Views {
-    sorted: Vec<View>,
-    /// The index in `sorted` of each CV, curve by curve.
+    /// Curve by curve.
+    views: Vec<View>,
+    /// Indices of all CVs, sorted so that successive ones are close to each other.
+    sorted: Vec<u32>,
+    /// The index in `sorted` of each CV.
     order: Vec<u32>,
-    /// The index in `order` where each curve starts, and where the last ends.
+    /// The first CV of each curve, and the end of the last.
     starts: Vec<u32>,
 }
 
@@ -42,31 +47,50 @@ impl Views {
     /// The CVs `points[starts[i]..starts[i + 1]]`.
     pub(super) fn of(frame: &Frame, starts: &[u32], points: &[Vec3], shield: &Shield<'_>) -> Self {
         let Some(base) = starts.first().copied() else {
-            return Self { sorted: Vec::new(), order: Vec::new(), starts: vec![0] };
+            return Self { views: Vec::new(), sorted: Vec::new(), order: Vec::new(), starts: vec![0] };
         };
         let points = &points[base as usize..starts[starts.len() - 1] as usize];
         let starts: Vec<u32> = starts.iter().map(|start| start - base).collect();
         let still = View { at: [0.0; 3], gap: Gap::default(), reach: 0.0 };
         let mut views = vec![still; points.len()];
         let tasks = split(&mut views, &starts);
-        parallel::for_each(tasks, |_, (curves, mut views)| {
+        let bounds = parallel::map(tasks, |_, (curves, mut views)| {
+            let mut bounds = Bounds::NONE;
             for ends in curves.windows(2) {
                 let cvs = &points[ends[0] as usize..ends[1] as usize];
                 let gap = frame.gap(cvs, shield.skin_gap);
                 let (mine, rest) = views.split_at_mut(cvs.len());
                 for ((view, cv), row) in mine.iter_mut().zip(cvs).zip((base + ends[0]) as usize..) {
                     *view = View { at: frame.at(*cv), gap, reach: frame.length(shield.offset.at(row)) };
+                    bounds.add(view.at);
                 }
                 views = rest;
             }
+            bounds
         });
-        let (sorted, order) = sorted(&views);
-        Self { sorted, order, starts }
+        let bounds = bounds.iter().fold(Bounds::NONE, Bounds::and);
+        let (sorted, order) = sorted(&views, &bounds);
+        Self { views, sorted, order, starts }
     }
 
-    /// All CVs, sorted so that neighbours are close to each other.
-    pub(super) fn sorted(&self) -> &[View] {
+    /// Number of CVs.
+    pub(super) fn len(&self) -> usize {
+        self.views.len()
+    }
+
+    /// The indices of all CVs, sorted so that successive ones are close to each other.
+    pub(super) fn sorted(&self) -> &[u32] {
         &self.sorted
+    }
+
+    /// The CVs with these indices, of which there is at least one; others repeat the first.
+    #[inline]
+    pub(super) fn group(&self, cvs: &[u32]) -> [View; LANES] {
+        let mut group = [self.views[cvs[0] as usize]; LANES];
+        for (view, cv) in group.iter_mut().zip(cvs) {
+            *view = self.views[*cv as usize];
+        }
+        group
     }
 
     /// Number of curves.
@@ -96,16 +120,17 @@ fn split<'a>(mut views: &'a mut [View], starts: &'a [u32]) -> Vec<Task<'a>> {
     tasks
 }
 
-/// The views sorted by cell (stable), and the new index of each.
-fn sorted(views: &[View]) -> (Vec<View>, Vec<u32>) {
+/// The indices of views sorted by cell (stable), and the index there of each.
+fn sorted(views: &[View], bounds: &Bounds) -> (Vec<u32>, Vec<u32>) {
     let mut bits = 1;
     while bits < FINEST && IN_CELL << (2 * bits) < views.len() {
         bits += 1;
     }
-    let grid = Grid::around(views, bits);
+    let grid = Grid::around(bounds, bits);
     let mut cells = vec![0; views.len()];
-    parallel::fill(&mut cells, TASK_CELLS, |view| grid.cell(views[view].at));
-    let mut next = vec![0_u32; (1 << (2 * bits)) + 1];
+    let (path, tasks) = (Path::chosen(), cells.chunks_mut(TASK_CELLS).zip(views.chunks(TASK_CELLS)));
+    parallel::for_each(tasks, |_, (cells, views)| write_cells(path, views, &grid, cells));
+    let mut next = vec![0_u32; (2 << (2 * bits)) + 1];
     for cell in &cells {
         next[*cell as usize + 1] += 1;
     }
@@ -114,60 +139,115 @@ fn sorted(views: &[View]) -> (Vec<View>, Vec<u32>) {
         sum += *count;
         *count = sum;
     }
-    let mut out = views.to_vec();
+    let mut sorted = vec![0; views.len()];
     let mut order = cells;
-    for (index, view) in order.iter_mut().zip(views) {
+    for (view, index) in order.iter_mut().enumerate() {
         let next = &mut next[*index as usize];
         *index = *next;
-        out[*next as usize] = *view;
+        sorted[*next as usize] = view as u32;
         *next += 1;
     }
-    (out, order)
+    (sorted, order)
 }
 
-/// Cells across the wind.
+/// Smallest and largest coordinates; NaN is ignored.
+#[derive(Clone, Copy)]
+struct Bounds {
+    low: Vec3,
+    high: Vec3,
+}
+
+impl Bounds {
+    const NONE: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
+
+    #[inline]
+    fn add(&mut self, at: Vec3) {
+        for axis in 0..3 {
+            let x = at[axis];
+            self.low[axis] = if x < self.low[axis] { x } else { self.low[axis] };
+            self.high[axis] = if x > self.high[axis] { x } else { self.high[axis] };
+        }
+    }
+
+    fn and(self, other: &Self) -> Self {
+        Self {
+            low: [0, 1, 2].map(|axis| self.low[axis].min(other.low[axis])),
+            high: [0, 1, 2].map(|axis| self.high[axis].max(other.high[axis])),
+        }
+    }
+}
+
+/// Cells across the wind, in two layers: CVs of the windward half have little upwind of them, those of the other half
+/// much. A group of both would test much for all.
 struct Grid {
     low: [f32; 2],
     /// Cells per unit of length.
     fine: [f32; 2],
     /// Index of the last cell along an axis.
     last: f32,
+    /// Where the windward layer begins.
+    middle: f32,
+    bits: u32,
 }
 
 impl Grid {
-    /// 2^`bits` cells along each axis.
-    fn around(views: &[View], bits: u32) -> Self {
-        let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-        for view in views {
-            for axis in 0..2 {
-                let x = view.at[axis];
-                low[axis] = if x < low[axis] { x } else { low[axis] };
-                high[axis] = if x > high[axis] { x } else { high[axis] };
-            }
-        }
+    /// 2^`bits` cells along each axis of each layer.
+    fn around(Bounds { low, high }: &Bounds, bits: u32) -> Self {
         let last = ((1_u32 << bits) - 1) as f32;
         let size = (high[0] - low[0]).max(high[1] - low[1]);
         let fine = if size > 0.0 && size < f32::INFINITY { (last + 1.0) / size } else { 0.0 };
-        Self { low, fine: [fine; 2], last }
+        let middle = 0.5 * low[2] + 0.5 * high[2];
+        Self { low: [low[0], low[1]], fine: [fine; 2], last, middle, bits }
     }
 
-    /// The index of a point's cell along a Z-order curve; any cell for NaN.
-    fn cell(&self, at: Vec3) -> u32 {
-        let mut cell = 0;
-        for axis in 0..2 {
-            let along = ((at[axis] - self.low[axis]) * self.fine[axis]).clamp(0.0, self.last);
-            cell |= spread(along as u32) << axis;
-        }
-        cell
+    /// The layer of a point, and its cell in there; any for NaN.
+    #[inline(always)]
+    fn cell(&self, at: Vec3) -> [u32; 3] {
+        let along = |axis: usize| ((at[axis] - self.low[axis]) * self.fine[axis]).clamp(0.0, self.last) as u32;
+        [along(0), along(1), u32::from(at[2] > self.middle)]
     }
 }
 
-/// Spreads sixteen bits, with a zero between neighbours.
-fn spread(x: u32) -> u32 {
-    let x = (x | x << 8) & 0x00ff_00ff;
-    let x = (x | x << 4) & 0x0f0f_0f0f;
-    let x = (x | x << 2) & 0x3333_3333;
-    (x | x << 1) & 0x5555_5555
+kernel! {
+    /// The index of each view's cell along a Hilbert curve through its layer.
+    fn write_cells(views: &[View], grid: &Grid, cells: &mut [u32]) = write_cells_body;
+}
+
+#[inline(always)]
+fn write_cells_body(views: &[View], grid: &Grid, cells: &mut [u32]) {
+    for (views, cells) in views.chunks(LANES).zip(cells.chunks_mut(LANES)) {
+        let mut at = [[0; LANES]; 3];
+        for lane in 0..views.len() {
+            let cell = grid.cell(views[lane].at);
+            for axis in 0..3 {
+                at[axis][lane] = cell[axis];
+            }
+        }
+        let [x, y, layer] = at;
+        let along = hilbert(x, y, grid.bits);
+        for lane in 0..cells.len() {
+            cells[lane] = along[lane] + (layer[lane] << (2 * grid.bits));
+        }
+    }
+}
+
+/// The positions along a Hilbert curve of cells of a grid of 2^`bits` cells a side. Cells that follow each other touch,
+/// unlike those along a Z-order curve, whose jumps make some groups of CVs wide.
+#[inline(always)]
+fn hilbert(mut x: [u32; LANES], mut y: [u32; LANES], bits: u32) -> [u32; LANES] {
+    let mut along = [0; LANES];
+    for bit in (0..bits).rev() {
+        for lane in 0..LANES {
+            let (right, up) = (x[lane] >> bit & 1, y[lane] >> bit & 1);
+            along[lane] = along[lane] << 2 | ((right << 1 | right) ^ up);
+            // The curve through the two lower quadrants is turned: axes swap, in the right one also both ends.
+            let lower = up.wrapping_sub(1);
+            let swapped = (x[lane] ^ y[lane]) & lower;
+            let flip = lower & 0_u32.wrapping_sub(right);
+            (x[lane], y[lane]) = (x[lane] ^ swapped ^ flip, y[lane] ^ swapped ^ flip);
+        }
+    }
+    along
 }
 
 #[cfg(test)]
@@ -182,14 +262,37 @@ mod tests {
         let points: Vec<Vec3> = along.iter().map(|k| [0.0, *k as f32, 0.0]).collect();
         let frame = Frame::of([0.0, 0.0, 1.0], &points, &[]).unwrap();
         let views = Views::of(&frame, &[0, 3, 8], &points, &STILL);
-        let at = |index: &u32| views.sorted()[*index as usize].at;
+        let at = |index: &u32| views.views[views.sorted()[*index as usize] as usize].at;
         let found: Vec<Vec3> = (0..views.curves()).flat_map(|curve| views.of_curve(curve)).map(at).collect();
         assert_eq!(found, points.iter().map(|point| frame.at(*point)).collect::<Vec<_>>());
         let cells: Vec<u32> = {
-            let grid = Grid::around(views.sorted(), 1);
-            views.sorted().iter().map(|view| grid.cell(view.at)).collect()
+            let mut bounds = Bounds::NONE;
+            views.views.iter().for_each(|view| bounds.add(view.at));
+            let grid = Grid::around(&bounds, 1);
+            let sorted: Vec<View> = views.sorted().iter().map(|cv| views.views[*cv as usize]).collect();
+            let mut cells = vec![0; sorted.len()];
+            write_cells(Path::chosen(), &sorted, &grid, &mut cells);
+            cells
         };
         assert!(cells.is_sorted() && cells[0] < cells[7], "{cells:?}");
+    }
+
+    #[test]
+    fn a_hilbert_curve_passes_each_cell_once_and_never_jumps() {
+        for bits in 1..=5 {
+            let side = 1 << bits;
+            let mut cells = vec![None; 1 << (2 * bits)];
+            for x in 0..side {
+                for y in 0..side {
+                    let along = hilbert([x; LANES], [y; LANES], bits)[0];
+                    assert!(cells[along as usize].replace([x, y]).is_none());
+                }
+            }
+            let cells: Vec<[u32; 2]> = cells.into_iter().map(|cell| cell.unwrap()).collect();
+            for pair in cells.windows(2) {
+                assert_eq!(pair[0][0].abs_diff(pair[1][0]) + pair[0][1].abs_diff(pair[1][1]), 1, "{bits} {pair:?}");
+            }
+        }
     }
 
     #[test]

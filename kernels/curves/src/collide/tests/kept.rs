@@ -2,6 +2,7 @@
 
 use super::*;
 use numerics::masked::Masked;
+use numerics::parallel;
 use numerics::vector::to_f32;
 
 type Mesh = (Vec<Vec3>, Vec<[u32; 3]>);
@@ -221,4 +222,23 @@ fn half_spaces_are_found_at_the_second_use_only() {
         let _ = collide(&fur.starts, &fur.rest, &fur.goal, &how);
         assert_eq!(kept.half_spaces_found(), found);
     }
+}
+
+#[test]
+fn uses_at_the_same_time_find_the_same() {
+    let fur = grown(body(12, |_, _| 1.0), 300, 0.2, 0.2);
+    let tree = TriangleTree::build(&fur.mesh.0, &fur.mesh.1);
+    let normals = normals(&fur.mesh.0, &fur.mesh.1);
+    let skin = SkinSurface { tree: &tree, triangles: &fur.mesh.1, normals: &normals };
+    let obstacles = [&tree];
+    let how = Collide { skin: Some(skin), offset_root: 0.01.into(), loft: 0.1.into(), ..hairs::on(&obstacles) };
+    let alone = collide(&fur.starts, &fur.rest, &fur.goal, &how);
+    let shared = AtRest::of(300);
+    let how = Collide { at_rest: Some(&shared), ..how.clone() };
+    let found = parallel::map(0..16, |_, _| collide(&fur.starts, &fur.rest, &fur.goal, &how));
+    assert!(found.iter().all(|found| *found == alone));
+    let once = at_rest(&fur.starts, &fur.rest, &Collide { at_rest: None, ..how.clone() });
+    assert_eq!(shared.is_low().collect::<Vec<_>>(), once.is_low().collect::<Vec<_>>());
+    assert!((0..300).all(|curve| shared.shift(curve) == once.shift(curve)));
+    assert_eq!(shared.half_spaces_found(), 300);
 }
