@@ -5,7 +5,7 @@ use super::springs::{self, Sums};
 use super::stage::{FrameContext, Stage, StageSolver};
 use super::system::{smoother, solve_lower};
 use numerics::partition::{Partition, RaggedSlice};
-use numerics::rank_one::RankOneTerms;
+use numerics::rank_one::{RankOneTerms, add_square};
 use numerics::vector::DVec3;
 
 /// Factor on the regions' contribution to a particle's own diagonal block. The block smoother then accounts for part
@@ -108,8 +108,8 @@ impl StageSolver {
         });
     }
 
-    /// The residual `r` at positions `x` with velocities `v`, and the linear system there, whose rank-one terms are set
-    /// already.
+    /// The residual `r` at positions `x` with velocities `v`, and the linear system there, whose rank-one terms and
+    /// blocks are set already.
     fn assemble_system(
         &mut self,
         context: &FrameContext<'_>,
@@ -120,7 +120,7 @@ impl StageSolver {
         let (body, a) = (context.body, stage.a);
         let clusters = &body.order.clusters;
         let mut system = std::mem::take(&mut self.system);
-        let (held, regions, transient) = (&system.held, &system.regions, &system.transient);
+        let (held, blocks, regions, transient) = (&system.held, &system.blocks, &system.regions, &system.transient);
         let per_particle = (
             r,
             &mut system.inertia[..],
@@ -148,6 +148,9 @@ impl StageSolver {
                 if !transient.is_empty() {
                     transient.add_block(particle, 1.0, usize::MAX, &mut block);
                 }
+                if let Some(other) = blocks.get(particle) {
+                    block.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
+                }
                 *inertia = mass + context.external.inertia(particle, mass, a);
                 [0, 3, 5].iter().for_each(|diagonal| block[*diagonal] += *inertia);
                 sums.forces[particle - first] = if held[particle] {
@@ -169,6 +172,7 @@ impl StageSolver {
             let weights = self.volumes.weights(a);
             self.system.regions.set(&weights, &self.volumes.gradients, clusters);
         }
+        self.system.blocks.clear();
         self.system.anchors = self.thin_tets.len();
         let (mut starts, mut particles, mut along) = (vec![0u32], Vec::new(), Vec::new());
         for thin in &self.thin_tets {
@@ -184,6 +188,13 @@ impl StageSolver {
                 continue;
             }
             let (directions, count) = contact.stiffness_directions(state, a, dual);
+            let mut sides = contact.sides();
+            if let (Some((particle, weight)), None) = (sides.next(), sides.next()) {
+                self.system.blocks.resize(body.len(), [0.0; 6]);
+                let block = &mut self.system.blocks[particle];
+                directions[..count].iter().for_each(|direction| add_square(block, *direction, weight * weight));
+                continue;
+            }
             for direction in &directions[..count] {
                 for (particle, weight) in contact.sides() {
                     particles.push(particle as u32);

@@ -33,7 +33,7 @@ impl ContactFilters {
         /// Contact stiffness below this fraction of a particle's total stiffness is ignored.
         const NEGLIGIBLE: f64 = 0.1;
         let mut filters = Self::default();
-        if system.transient.is_empty() && system.isolated.is_empty() {
+        if system.blocks.is_empty() && system.transient.is_empty() && system.isolated.is_empty() {
             return filters;
         }
         // Terms that the coarse matrix leaves out anchor both their sides.
@@ -43,7 +43,7 @@ impl ContactFilters {
                 filters.insert(particle, system.inertia.len(), [[0.0; 3]; 3]);
                 continue;
             }
-            let mut block = [0.0; 6];
+            let mut block = system.blocks.get(particle).copied().unwrap_or_default();
             if !system.transient.is_empty() {
                 system.transient.add_block(particle, 1.0, end, &mut block);
             }

@@ -263,7 +263,7 @@ impl Stepper<'_> {
         if (unmet > 0.0 || stepped.solved.failed) && !no_help {
             parts = parts.max(2);
         }
-        let shortest = share <= 1.0 / f64::from(MOST_STEPS);
+        let shortest = share * f64::from(MOST_STEPS) < 2.0;
         let is_over = self.report.newton >= MOST_NEWTON[usize::from(self.tolerance.is_some())] || shortest;
         if self.frame.substeps > 0 || (self.frame.cancelled)() || is_over || parts < 2 {
             self.report.uncut_impacts += u32::from(wanted > 1 && !shortest);

@@ -6,7 +6,7 @@ use super::springs::Record;
 use super::system::System;
 use numerics::cholesky::EnvelopeMatrix;
 use numerics::partition::Partition;
-use numerics::rank_one::RankOneTerms;
+use numerics::rank_one::{RankOneTerms, add_square};
 use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
 
 /// Contacts between bodies are left out where they make factoring more than this many times as dear.
@@ -45,7 +45,7 @@ impl Galerkin<'_> {
 
     /// The blocks of a cluster's row from cluster `first` to the diagonal: springs and diagonal terms.
     fn band(&self, first: usize, cluster: usize) -> Vec<Block> {
-        let Self { layout, body, system, .. } = self;
+        let Self { layout, body, system, offset_from_centroid, filters } = self;
         let mut blocks = vec![Block::default(); cluster + 1 - first];
         let last = cluster - first;
         for particle in body.order.clusters.range(cluster) {
@@ -54,17 +54,36 @@ impl Galerkin<'_> {
             if system.held[particle] {
                 continue;
             }
+            let mine = to_f64(offset_from_centroid[particle]);
+            let filter = filters.at(particle);
             // Stiffness and inertia of the particle itself.
-            let mut own = DMat3::from_diagonal_element(system.inertia[particle]);
+            let mut own = system.blocks.get(particle).copied().unwrap_or_default();
+            let mut alike = system.inertia[particle];
             for record in across {
-                let (other, h) = (record.other as usize, record.stiffness());
-                own += h;
+                let (other, alpha, w) = (record.other as usize, f64::from(record.alpha), record.along());
+                alike += alpha;
+                add_square(&mut own, w, 1.0);
                 let home = layout.cluster[other] as usize;
                 if home < cluster && !system.held[other] {
-                    self.couple(&-h, [particle, other], &mut blocks[home - first]);
+                    let (block, far) = (&mut blocks[home - first], to_f64(offset_from_centroid[other]));
+                    if filter.is_none() && filters.at(other).is_none() {
+                        block.add_alike(-alpha, mine, far);
+                        block.add_along(-1.0, w, mine, far);
+                    } else {
+                        for (scale, direction) in directions(record) {
+                            block.add(-scale, &self.along(particle, direction), &self.along(other, direction));
+                        }
+                    }
                 }
             }
-            self.couple(&own, [particle; 2], &mut blocks[last]);
+            if own == [0.0; 6] && filter.is_none() {
+                blocks[last].add_alike(alike, mine, mine);
+            } else {
+                let [xx, xy, xz, yy, yz, zz] = own;
+                let h = DMat3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) + DMat3::from_diagonal_element(alike);
+                let motion = motion(filter, mine);
+                blocks[last].add_product(motion, &h, motion);
+            }
         }
         blocks
     }
@@ -73,27 +92,19 @@ impl Galerkin<'_> {
     #[inline(always)]
     fn add_inside(&self, particle: usize, record: &Record, block: &mut Block) {
         let ends = [particle, record.other as usize];
-        let free = |end: &usize| !self.system.held[*end];
-        if ends.iter().all(|end| free(end) && self.filters.at(*end).is_none()) {
+        let filters = ends.map(|end| self.filters.at(end));
+        let held = ends.map(|end| self.system.held[end]);
+        if held == [false; 2] && filters == [None; 2] {
             let [here, there] = ends.map(|end| to_f64(self.offset_from_centroid[end]));
             block.add_turn(f64::from(record.alpha), record.along(), here - there);
             return;
         }
-        let h = record.stiffness();
-        for (first, second) in ends.into_iter().flat_map(|first| ends.map(|second| (first, second))) {
-            if free(&first) && free(&second) {
-                self.couple(&if first == second { h } else { -h }, [first, second], block);
-            }
+        for (scale, direction) in directions(record) {
+            let [here, there] =
+                ends.map(|end| if self.system.held[end] { [0.0; MODES] } else { self.along(end, direction) });
+            let apart = std::array::from_fn(|mode| here[mode] - there[mode]);
+            block.add(scale, &apart, &apart);
         }
-    }
-
-    /// Adds the stiffness `h` between two particles, filtered.
-    #[inline(always)]
-    fn couple(&self, h: &DMat3, ends: [usize; 2], block: &mut Block) {
-        let [left, right] = ends.map(|end| self.filters.at(end));
-        let h = left.map_or(*h, |filter| filter.transpose() * h);
-        let [p, q] = ends.map(|end| to_f64(self.offset_from_centroid[end]));
-        block.add_stiffness(&right.map_or(h, |filter| h * filter), p, q);
     }
 
     /// Displacement of a particle along `direction` by each rigid motion of its cluster.
@@ -125,7 +136,7 @@ impl Galerkin<'_> {
         }
     }
 
-    /// Change of a rank-one term by the rigid motions of each cluster. Empty for several particles that are in one cluster
+    /// Change of a rank-one term by the rigid motions of each cluster. Empty if all its particles are in one cluster
     /// and unfiltered, since rigid motions change neither volumes nor gaps.
     fn couplings(&self, rows: &RankOneTerms, row: usize) -> Vec<Coupling> {
         let Self { layout, system, filters, .. } = self;
@@ -133,9 +144,10 @@ impl Galerkin<'_> {
         let home = |particle: usize| layout.cluster[particle] as usize;
         let particles = rows.particles(row);
         let free = |particle: usize| !system.held[particle] && filters.at(particle).is_none();
-        let inside =
-            |particle: &u32| home(*particle as usize) == home(particles[0] as usize) && free(*particle as usize);
-        if particles.len() > 1 && particles.iter().all(inside) {
+        if particles
+            .iter()
+            .all(|particle| home(*particle as usize) == home(particles[0] as usize) && free(*particle as usize))
+        {
             return couplings;
         }
         for (particle, g) in rows.entries(row).filter(|(particle, _)| !system.held[*particle]) {
@@ -169,6 +181,14 @@ struct Coupling {
     along: [f64; MODES],
 }
 
+/// The directions in which a spring has stiffness, each with that stiffness.
+#[inline(always)]
+fn directions(record: &Record) -> impl Iterator<Item = (f64, DVec3)> {
+    let alpha = f64::from(record.alpha);
+    let alike = [DVec3::x(), DVec3::y(), DVec3::z()].map(|axis| (alpha, axis));
+    std::iter::once((1.0, record.along())).chain(alike.into_iter().take(if alpha > 0.0 { 3 } else { 0 }))
+}
+
 /// Writes the block row of a cluster in envelope order, up to the diagonal.
 fn write(blocks: &[Block], out: &mut [f64]) {
     let before = MODES * (blocks.len() - 1);
@@ -183,6 +203,13 @@ fn write(blocks: &[Block], out: &mut [f64]) {
 #[inline(always)]
 fn turn(r: DVec3) -> DMat3 {
     DMat3::new(0.0, r.z, -r.y, -r.z, 0.0, r.x, r.y, -r.x, 0.0)
+}
+
+/// Displacement at `offset` for translations and rotations, filtered.
+#[inline(always)]
+fn motion(filter: Option<DMat3>, offset: DVec3) -> [DMat3; 2] {
+    let shift = filter.unwrap_or_else(DMat3::identity);
+    [shift, shift * turn(offset)]
 }
 
 /// Coupling of the rigid motions of two clusters.
@@ -203,13 +230,50 @@ impl Block {
         }
     }
 
-    /// Pᵀ·h·Q, with P and Q the translations and rotations of particles at `p` and `q`.
+    /// Pᵀ·αI·Q for unfiltered particles at `p` and `q`. Written out, as `add_along` is: the general product rounds so that
+    /// springs of 1e12 N/m beside others of 1e-6 N/m end at the bound of Newton iterations.
     #[inline(always)]
-    fn add_stiffness(&mut self, h: &DMat3, p: DVec3, q: DVec3) {
-        let (back, turned) = (turn(p).transpose(), h * turn(q));
-        for (row, column, part) in [(0, 0, *h), (0, 3, turned), (3, 0, back * h), (3, 3, back * turned)] {
-            for i in 0..3 {
-                (0..3).for_each(|j| self.0[row + i][column + j] += part[(i, j)]);
+    fn add_alike(&mut self, alpha: f64, p: DVec3, q: DVec3) {
+        let (p, dot) = (p * alpha, p.dot(&q) * alpha);
+        let q_alpha = q * alpha;
+        let shift_turn = [[0.0, q_alpha.z, -q_alpha.y], [-q_alpha.z, 0.0, q_alpha.x], [q_alpha.y, -q_alpha.x, 0.0]];
+        let turn_shift = [[0.0, -p.z, p.y], [p.z, 0.0, -p.x], [-p.y, p.x, 0.0]];
+        for i in 0..3 {
+            self.0[i][i] += alpha;
+            self.0[3 + i][3 + i] += dot;
+            for j in 0..3 {
+                self.0[i][3 + j] += shift_turn[i][j];
+                self.0[3 + i][j] += turn_shift[i][j];
+                self.0[3 + i][3 + j] -= q[i] * p[j];
+            }
+        }
+    }
+
+    /// Pᵀ·s·wwᵀ·Q for unfiltered particles at `p` and `q`.
+    #[inline(always)]
+    fn add_along(&mut self, s: f64, w: DVec3, p: DVec3, q: DVec3) {
+        let (p, q) = (p.cross(&w), q.cross(&w));
+        self.add(s, &[w.x, w.y, w.z, p.x, p.y, p.z], &[w.x, w.y, w.z, q.x, q.y, q.z]);
+    }
+
+    /// s·p·qᵀ.
+    #[inline(always)]
+    fn add(&mut self, s: f64, p: &[f64; MODES], q: &[f64; MODES]) {
+        for (row, p) in self.0.iter_mut().zip(p) {
+            let left = s * p;
+            row.iter_mut().zip(q).for_each(|(sum, q)| *sum += left * q);
+        }
+    }
+
+    /// Pᵀ·h·Q for translations and rotations of two particles.
+    fn add_product(&mut self, p: [DMat3; 2], h: &DMat3, q: [DMat3; 2]) {
+        for (row, p) in p.iter().enumerate() {
+            let left = p.transpose() * h;
+            for (column, q) in q.iter().enumerate() {
+                let both = left * q;
+                for i in 0..3 {
+                    (0..3).for_each(|j| self.0[3 * row + i][3 * column + j] += both[(i, j)]);
+                }
             }
         }
     }
@@ -220,13 +284,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_spring_within_a_cluster_resists_rotation_as_its_four_blocks_do() {
+    fn shortcuts_for_unfiltered_particles_equal_the_full_product() {
         let [p, q, w] = [[0.3, -0.8, 0.5], [-0.9, 0.1, 0.7], [1.2, 0.4, -2.0]].map(DVec3::from);
         let (mut short, mut long) = (Block::default(), Block::default());
+        short.add_alike(1.7, p, q);
+        short.add_along(-0.6, w, p, q);
+        let h = DMat3::from_diagonal_element(1.7) - w * w.transpose() * 0.6;
+        long.add_product(motion(None, p), &h, motion(None, q));
+        // All four blocks of a spring within one cluster.
         short.add_turn(0.9, w, p - q);
         let h = DMat3::from_diagonal_element(0.9) + w * w.transpose();
         for (a, b, sign) in [(p, p, 1.0), (q, q, 1.0), (p, q, -1.0), (q, p, -1.0)] {
-            long.add_stiffness(&(h * sign), a, b);
+            long.add_product(motion(None, a), &(h * sign), motion(None, b));
         }
         for (short, long) in short.0.as_flattened().iter().zip(long.0.as_flattened()) {
             assert!((short - long).abs() < 1e-14, "{short} for {long}");

@@ -11,7 +11,7 @@ use super::body::SoftBody;
 use numerics::adjacency::Incident;
 use numerics::partition::RaggedSlice;
 use numerics::random::Key;
-use numerics::vector::{DMat3, DVec3, Vec3, to_f32, to_f64};
+use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
 /// Largest a²k of a record: products with displacements stay well within the range of f32.
 const MOST_STIFFNESS: f64 = 1e24;
@@ -44,13 +44,6 @@ impl Record {
     #[inline(always)]
     pub(super) fn along(&self) -> DVec3 {
         to_f64(self.w)
-    }
-
-    /// H.
-    #[inline(always)]
-    pub(super) fn stiffness(&self) -> DMat3 {
-        let w = self.along();
-        DMat3::from_diagonal_element(f64::from(self.alpha)) + w * w.transpose()
     }
 
     /// H·d.

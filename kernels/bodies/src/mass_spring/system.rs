@@ -18,6 +18,9 @@ pub(super) struct System {
     pub(super) records: Vec<Record>,
     /// Isotropic diagonal terms of each particle: mass, drag, goals. Kilograms.
     pub(super) inertia: Vec<f64>,
+    /// Contacts of single particles, xx xy xz yy yz zz; empty without any. In f64: penalties may be 1e12 times as stiff as what
+    /// resists along the surface.
+    pub(super) blocks: Vec<[f64; 6]>,
     /// Pinned particles.
     pub(super) held: Vec<bool>,
     /// Particles without intact springs; empty if there are none.
@@ -60,6 +63,9 @@ impl System {
                 if system.held[particle] {
                     out[particle - first] = DVec3::zeros();
                     continue;
+                }
+                if !system.blocks.is_empty() {
+                    total += times(&system.blocks[particle], mine);
                 }
                 if regions {
                     total += system.regions.push(particle);
