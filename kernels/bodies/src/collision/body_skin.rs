@@ -68,16 +68,16 @@ impl BodySkin {
         let surfaces: Vec<_> = surfaces
             .iter()
             .map(|triangles| {
-                let surface = TriangleSurface::new(triangles);
+                let surface = TriangleSurface::new(rest.len(), triangles);
                 let turn =
                     surface.closed && triangles[0][0] as usize >= particles && signed_volume(triangles, rest) < 0.0;
-                if turn { TriangleSurface::new(&turned(triangles)) } else { surface }
+                if turn { TriangleSurface::new(rest.len(), &turned(triangles)) } else { surface }
             })
             .collect();
         let edges = surfaces.iter().flat_map(|surface| &surface.edges).map(|edge| edge.ends);
         let carried = (particles as u32..).zip(riding);
         let carried = carried.flat_map(|(point, carrier)| carrier.sides().map(move |(particle, _)| [point, particle]));
-        let neighbours = Neighbours::new(links.iter().copied().chain(edges).chain(carried));
+        let neighbours = Neighbours::new(rest.len(), links.iter().copied().chain(edges).chain(carried));
         let touching = touching(&surfaces, &neighbours, rest, particles);
         let skin = |(surface, touching): (TriangleSurface, Vec<u32>)| {
             let (starts, rings) = rings(&surface, &neighbours, rest.len(), particles);
@@ -108,14 +108,14 @@ impl BodySkin {
         self.rest.len()
     }
 
-    /// Whether one of the `others` is within two links of one of these points of the surface. Points that ride along are as
-    /// near as what they ride on.
-    pub(super) fn is_near(&self, points: &[u32], others: &[u32]) -> bool {
-        let around =
-            |point: u32| &self.rings[self.starts[point as usize] as usize..self.starts[point as usize + 1] as usize];
-        let knows = |other: &u32| points.iter().any(|point| around(*point).binary_search(other).is_ok());
-        let rides = |other: u32| other as usize >= self.particles;
-        others.iter().any(|other| if rides(*other) { around(*other).iter().any(knows) } else { knows(other) })
+    /// Whether a contact point rides along on particles.
+    pub(super) fn rides(&self, point: u32) -> bool {
+        point as usize >= self.particles
+    }
+
+    /// Surface particles within two links of one of them, itself included; the particles that a riding point rides on.
+    pub(super) fn around(&self, particle: u32) -> &[u32] {
+        &self.rings[self.starts[particle as usize] as usize..self.starts[particle as usize + 1] as usize]
     }
 
     /// Distance of a particle from a triangle at rest, metres.
@@ -221,20 +221,28 @@ fn edge_length(edge: &Edge, places: &[[f64; 3]]) -> f64 {
     (at.position(edge.ends[0]) - at.position(edge.ends[1])).norm()
 }
 
-/// Pairs of contact points that share a link or an edge, or of which one rides on the other: each both ways, ascending.
-struct Neighbours(Vec<[u32; 2]>);
+/// The particles that share a link or an edge with each particle.
+struct Neighbours {
+    starts: Vec<u32>,
+    pairs: Vec<[u32; 2]>,
+}
 
 impl Neighbours {
-    fn new(links: impl Iterator<Item = [u32; 2]>) -> Self {
+    fn new(count: usize, links: impl Iterator<Item = [u32; 2]>) -> Self {
         let mut pairs: Vec<[u32; 2]> = links.flat_map(|[a, b]| [[a, b], [b, a]]).collect();
         pairs.sort_unstable();
         pairs.dedup();
-        Self(pairs)
+        let mut starts = vec![0; count + 1];
+        pairs.iter().for_each(|pair| starts[pair[0] as usize + 1] += 1);
+        for particle in 0..count {
+            starts[particle + 1] += starts[particle];
+        }
+        Self { starts, pairs }
     }
 
-    fn of(&self, point: u32) -> impl Iterator<Item = u32> {
-        let first = self.0.partition_point(|pair| pair[0] < point);
-        self.0[first..].iter().take_while(move |pair| pair[0] == point).map(|pair| pair[1])
+    fn of(&self, particle: u32) -> impl Iterator<Item = u32> {
+        let range = self.starts[particle as usize] as usize..self.starts[particle as usize + 1] as usize;
+        self.pairs[range].iter().map(|pair| pair[1])
     }
 }
 

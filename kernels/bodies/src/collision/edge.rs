@@ -59,6 +59,13 @@ struct Pair<'a> {
 }
 
 impl Pair<'_> {
+    fn segments(&self, pose: usize) -> [[DVec3; 2]; 2] {
+        [
+            self.edge.ends.map(|end| Moment::of(self.first.poses[pose]).position(end)),
+            self.other.ends.map(|end| Moment::of(self.second.poses[pose]).position(end)),
+        ]
+    }
+
     /// Both edge vectors and the offset between their first ends.
     #[inline]
     fn configuration(&self, pose: usize) -> [DVec3; 3] {
@@ -73,16 +80,16 @@ impl Pair<'_> {
         for (t, above) in sign_changes(start, end).iter() {
             let [d, e, r] = [0, 1, 2].map(|k| start[k].lerp(&end[k], t));
             let size = d.norm().max(e.norm()).max(start[2].norm()).max(end[2].norm());
-            let shares = closest(&[d, e, r]);
+            let [s, u] = along([DVec3::zeros(), d], [r, r + e]);
             let side = if above { -1.0 } else { 1.0 };
             let Some(normal) = (d.cross(&e) * side).try_normalize(1e-12 * d.norm() * e.norm()) else { continue };
             let time = piece as f64 + t;
-            if between(&[d, e, r], shares).norm() <= ON * size && self.faces(time, shares, normal, LEAN_THROUGH) {
+            if (d * s - r - e * u).norm() <= ON * size && self.faces(time, [s, u], normal, LEAN_THROUGH) {
                 let [d, e, _] = self.configuration(self.first.poses.len() - 1);
                 let last = (d.cross(&e) * side).try_normalize(1e-12 * d.norm() * e.norm());
                 // The edges may have rotated past each other; then the normal at the crossing is kept.
                 let normal = last.filter(|last| last.dot(&normal) > 0.5).unwrap_or(normal);
-                return Some(Hit { shares, normal });
+                return Some(Hit { shares: [s, u], normal });
             }
         }
         None
@@ -91,9 +98,9 @@ impl Pair<'_> {
     /// Closeness at one pose, reported for the last.
     fn near(&self, pose: usize, reach: f64) -> Option<Hit> {
         let inner = |share: f64| share > ON && share < 1.0 - ON;
-        let edges = self.configuration(pose);
-        let shares = closest(&edges);
-        let away = between(&edges, shares);
+        let segments = self.segments(pose);
+        let shares = along(segments[0], segments[1]);
+        let away = between(segments, shares);
         let distance = away.norm();
         if !(distance <= reach && distance > 0.0 && shares.into_iter().all(inner)) {
             return None;
@@ -102,7 +109,7 @@ impl Pair<'_> {
         if !self.faces(pose as f64, shares, normal, LEAN_NEAR) {
             return None;
         }
-        let last = between(&self.configuration(self.first.poses.len() - 1), shares);
+        let last = between(self.segments(self.first.poses.len() - 1), shares);
         let turned = last.try_normalize(0.0).filter(|last| last.dot(&normal) > 0.0);
         Some(Hit { shares, normal: turned.unwrap_or(normal) })
     }
@@ -114,14 +121,8 @@ impl Pair<'_> {
     }
 }
 
-/// Parameters of the closest points of two edges, given as in [`Pair::configuration`].
-fn closest([d, e, r]: &[DVec3; 3]) -> [f64; 2] {
-    along([DVec3::zeros(), *d], [*r, r + e])
-}
-
-/// The vector from a point of the second edge to one of the first.
-fn between([d, e, r]: &[DVec3; 3], [s, u]: [f64; 2]) -> DVec3 {
-    d * s - r - e * u
+fn between([[p, q], [a, b]]: [[DVec3; 2]; 2], [s, u]: [f64; 2]) -> DVec3 {
+    p.lerp(&q, s) - a.lerp(&b, u)
 }
 
 /// Whether the adjacent triangles fall away from an edge as seen along `out`, which has to point outwards.

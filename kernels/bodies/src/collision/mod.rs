@@ -37,6 +37,7 @@ use numerics::vector::{DVec3, to_f32};
 pub use obstacle::{Ground, Obstacle};
 pub use overlap::{Overlap, OverlapPartner, Penetration, Separation};
 pub use pair::ContactParams;
+use std::sync::Mutex;
 use surface::Positions;
 use vertex::{ContactRules, MovingSurface};
 
@@ -270,12 +271,18 @@ struct SkinObstaclePair<'a> {
     rules: ContactRules,
 }
 
-/// Collects the contacts that `find_in` adds for `things`, in their order, for any number of threads.
-fn collect_in_order(things: &[u32], find_in: &(dyn Fn(&[u32], &mut Vec<Contact>) + Sync), out: &mut Vec<Contact>) {
+/// Adds the contacts of some things to a list, with buffers that another task may have used before.
+type FindIn<'a, S> = dyn Fn(&mut S, &[u32], &mut Vec<Contact>) + Sync + 'a;
+
+/// Collects the contacts of `things` in their order, for any number of threads.
+fn collect_in_order<S: Default + Send>(things: &[u32], find_in: &FindIn<'_, S>, out: &mut Vec<Contact>) {
+    let unused: Mutex<Vec<S>> = Mutex::default();
+    let lock = || unused.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let parts = parallel::map(things.chunks(TASK), |_, things| {
-        let mut found = Vec::new();
-        find_in(things, &mut found);
-        found
+        let (mut scratch, mut seen) = (lock().pop().unwrap_or_default(), Vec::new());
+        find_in(&mut scratch, things, &mut seen);
+        lock().push(scratch);
+        seen
     });
     out.extend(parts.into_iter().flatten());
 }
@@ -292,7 +299,7 @@ impl SkinObstaclePair<'_> {
         let bounds = tree.bounds;
         // Made before the loop: a thread of the pool that waits for another's tree could wait forever.
         let solid = self.solid_at_start(&bounds);
-        let find_in = |particles: &[u32], out: &mut Vec<Contact>| {
+        let find_in = |(): &mut (), particles: &[u32], out: &mut Vec<Contact>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
             for particle in particles.iter().filter(|particle| !self.released.has_particle(**particle)) {
                 tree.overlapping(&self.boxes[0][*particle as usize], &mut faces);
@@ -342,7 +349,7 @@ impl SkinObstaclePair<'_> {
 
     /// Sharp points of the obstacle against triangles of the skin.
     fn points(&self, tree: &SweptBoxTree<'_>, out: &mut Vec<Contact>) {
-        let find_in = |points: &[u32], out: &mut Vec<Contact>| {
+        let find_in = |(): &mut (), points: &[u32], out: &mut Vec<Contact>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
             for point in points {
                 let region = swept::inflated(&self.boxes[1][*point as usize], self.rules.reach);
@@ -369,7 +376,7 @@ impl SkinObstaclePair<'_> {
     fn edges(&self, out: &mut Vec<Contact>) {
         let tree = self.obstacle.edges.sweep(self.boxes[1], self.rules.reach);
         let indices: Vec<u32> = (0..self.skin.surface.edges.len() as u32).collect();
-        let find_in = |edges: &[u32], out: &mut Vec<Contact>| {
+        let find_in = |(): &mut (), edges: &[u32], out: &mut Vec<Contact>| {
             let mut others = Vec::new();
             for index in edges.iter().filter(|edge| !self.released.has_edge(**edge)) {
                 let edge = &self.skin.surface.edges[*index as usize];

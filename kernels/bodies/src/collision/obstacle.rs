@@ -55,7 +55,7 @@ impl Obstacle {
         for (what, value) in [("seconds", seconds), ("thickness", thickness), ("friction", friction)] {
             check_number(what, value)?;
         }
-        let surface = TriangleSurface::new(triangles);
+        let surface = TriangleSurface::new(points, triangles);
         let first = &poses[0].positions[..];
         let flat = |index: u32| poses.iter().all(|pose| is_flat(&surface, &Moment::of(&pose.positions), index));
         let sharp_edges: Vec<u32> = (0..surface.edges.len() as u32).filter(|index| !flat(*index)).collect();
@@ -89,7 +89,14 @@ impl Obstacle {
         self.motion.at(share)
     }
 
-    /// The velocity of the mean of its `points` with these weights, m/s.
+    /// Its velocity at the point of a triangle with barycentric `weights`, m/s.
+    ///
+    /// # Panics
+    /// If there is no such triangle.
+    pub fn velocity(&self, share: f64, triangle: u32, weights: [f64; 3]) -> [f64; 3] {
+        self.velocity_of(share, &self.surface.triangles[triangle as usize], &weights).into()
+    }
+
     pub(super) fn velocity_of(&self, share: f64, points: &[u32], weights: &[f64]) -> DVec3 {
         if self.seconds <= 0.0 {
             return DVec3::zeros();

@@ -11,9 +11,8 @@
 //!
 //! Limit: bodies of which only edges cross, with no point of one inside the other, are not seen.
 
-use super::obstacle::narrow;
 use super::surface::{Moment, TriangleSurface};
-use super::{BodySkin, CollisionScene, ContactParams, Obstacle};
+use super::{BodySkin, CollisionScene, Obstacle};
 use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
 use crate::tets::{Enclosure, Exit, bounds};
 use numerics::closest_point::ClosestPoint;
@@ -104,11 +103,6 @@ impl<'a> Side<'a> {
         Self { points, candidates, surface, below, solid: Enclosure::new(points, &surface.triangles, touching) }
     }
 
-    /// The side of a skin with contact points at `points`.
-    fn of_skin(points: &'a [[f64; 3]], skin: &'a BodySkin, gaps: [f64; 2]) -> Self {
-        Self::new(points, &skin.touching, &skin.surface, gaps)
-    }
-
     /// Which of its points are inside the other.
     fn within(&self, other: &Self) -> Vec<bool> {
         let mut inside = vec![false; self.points.len()];
@@ -192,7 +186,7 @@ impl CollisionScene<'_> {
             for (index, (obstacle, points)) in obstacles.iter().enumerate() {
                 if obstacle.surface.closed && overlap(&boxes[skin], &bounds(points.iter().copied())) {
                     let gaps = [obstacle.thickness; 2];
-                    let side = Side::of_skin(x, own, gaps);
+                    let side = Side::new(x, &own.touching, &own.surface, gaps);
                     let other = Side::new(points, &obstacle.surface.vertices, &obstacle.surface, gaps);
                     let ways = Ways { ground: self.room(own, x), gap: obstacle.thickness };
                     let [marked, _] = ways.add(skin, OverlapPartner::Obstacle(index), [&side, &other], &mut found);
@@ -201,7 +195,7 @@ impl CollisionScene<'_> {
             }
             for (index, next) in self.skins.iter().enumerate().skip(skin + 1) {
                 if self.body_contact.is_some() && overlap(&boxes[skin], &boxes[index]) {
-                    let [side, other] = [own, next].map(|of| Side::of_skin(x, of, [thickness; 2]));
+                    let [side, other] = [own, next].map(|of| Side::new(x, &of.touching, &of.surface, [thickness; 2]));
                     let ways = Ways { ground: None, gap: thickness };
                     let marked = ways.add(skin, OverlapPartner::Skin(index), [&side, &other], &mut found);
                     marked.iter().for_each(|marked| mark(marked));
@@ -257,71 +251,84 @@ impl CollisionScene<'_> {
         let mut pushed = Vec::new();
         let overlaps = self.separation.map_or(&[][..], |separation| separation.overlaps);
         for overlap in overlaps.iter().filter(|overlap| self.separating(overlap.skin, overlap.partner).is_some()) {
-            let first = &self.skins[overlap.skin];
             match overlap.partner {
                 OverlapPartner::Ground => {}
-                OverlapPartner::Obstacle(index) => {
-                    let obstacle = &self.obstacles[index];
-                    let ([start, end], gap) = (query.times.map(|time| obstacle.at(time)), obstacle.thickness);
-                    let solid = Side::new(&start, &obstacle.surface.vertices, &obstacle.surface, [gap, 0.0]);
-                    let sides = [&Side::of_skin(query.from, first, [gap, 0.0]), &solid];
-                    let particles = self.push_apart(query, overlap, sides, gap, Some((obstacle, &end)), out);
-                    pushed.push(Pushed { skin: overlap.skin, obstacle: index, particles });
+                OverlapPartner::Obstacle(obstacle) => {
+                    let particles = self.out_of_obstacle(query, overlap, &self.obstacles[obstacle], out);
+                    pushed.push(Pushed { skin: overlap.skin, obstacle, particles });
                 }
-                OverlapPartner::Skin(index) => {
-                    let Some(ContactParams { thickness, .. }) = self.body_contact else { continue };
-                    let both = [first, &self.skins[index]];
-                    let sides = both.map(|skin| Side::of_skin(query.from, skin, [thickness, 0.0]));
-                    self.push_apart(query, overlap, [&sides[0], &sides[1]], thickness, None, out);
-                }
+                OverlapPartner::Skin(index) => self.out_of_skin(query, overlap, &self.skins[index], out),
             }
         }
         pushed
     }
 
-    /// Pushes two sides `gap` apart; the second is that of an obstacle, which is at the given positions in the end, or of a
-    /// skin. Returns the particles of the first that are pushed.
-    fn push_apart(
+    fn out_of_skin(&self, query: &ContactQuery<'_>, overlap: &Overlap, other: &BodySkin, out: &mut Vec<Contact>) {
+        let Some(params) = self.body_contact else { return };
+        let direction = DVec3::from(overlap.direction);
+        let [first, other] = [&self.skins[overlap.skin], other]
+            .map(|skin| Side::new(query.from, &skin.touching, &skin.surface, [params.thickness, 0.0]));
+        for ([inner, outer], normal) in [([&first, &other], direction), ([&other, &first], -direction)] {
+            for exit in inner.exits(outer, inner.candidates, normal) {
+                let [a, b, c] = outer.surface.triangles[exit.face as usize];
+                let [u, v, w] = outer.weights(inner, &exit, normal);
+                let (allowed, speed) = self.allowed(overlap, exit.distance + params.thickness, query.times);
+                out.push(Contact {
+                    points: [exit.point, a, b, c],
+                    weights: [1.0, -u, -v, -w],
+                    normal: normal.into(),
+                    offset: -allowed,
+                    gap: params.thickness,
+                    velocity: (normal * speed).into(),
+                    friction: 0.0,
+                    jammed: false,
+                });
+            }
+        }
+    }
+
+    /// Returns the particles that are pushed.
+    fn out_of_obstacle(
         &self,
         query: &ContactQuery<'_>,
         overlap: &Overlap,
-        [first, second]: [&Side<'_>; 2],
-        gap: f64,
-        obstacle: Option<(&Obstacle, &[[f64; 3]])>,
+        other: &Obstacle,
         out: &mut Vec<Contact>,
     ) -> Vec<u32> {
-        let direction = DVec3::from(overlap.direction);
-        let [exits, others] = [([first, second], direction), ([second, first], -direction)]
-            .map(|([inner, outer], normal)| inner.exits(outer, inner.candidates, normal));
-        let pushed = exits.iter().map(|exit| exit.point).collect();
-        let exits = exits.iter().map(|exit| (exit, [first, second], direction));
-        for (exit, [inner, outer], normal) in exits.chain(others.iter().map(|exit| (exit, [second, first], -direction)))
-        {
-            let ([a, b, c], point) = (outer.surface.triangles[exit.face as usize], exit.point);
-            let [u, v, w] = outer.weights(inner, exit, normal);
-            let (allowed, speed) = self.allowed(overlap, exit.distance + gap, query.times);
-            let mut contact = Contact {
-                points: [point, a, b, c],
-                weights: [1.0, -u, -v, -w],
+        let first = &self.skins[overlap.skin];
+        let normal = DVec3::from(overlap.direction);
+        let [start, end] = query.times.map(|time| other.at(time));
+        let mut push = |exit: &Exit, (own, weights): ([u32; 4], [f64; 4]), (points, shares): (&[u32], &[f64])| {
+            let (allowed, speed) = self.allowed(overlap, exit.distance + other.thickness, query.times);
+            let reached: DVec3 =
+                points.iter().zip(shares).map(|(point, share)| DVec3::from(end[*point as usize]) * *share).sum();
+            let velocity = other.velocity_of(query.times[1], points, shares) + normal * speed;
+            out.push(Contact {
+                points: own,
+                weights,
                 normal: normal.into(),
-                offset: -allowed,
-                gap,
-                velocity: (normal * speed).into(),
+                offset: normal.dot(&reached) - allowed,
+                gap: other.thickness,
+                velocity: velocity.into(),
                 friction: 0.0,
                 jammed: false,
-            };
-            if let Some((obstacle, end)) = obstacle {
-                let (ours, theirs) = (([point, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]), ([a, b, c, 0], [u, v, w, 0.0]));
-                let (own, (points, weights)) = if normal == direction { (ours, theirs) } else { (theirs, ours) };
-                let reached: DVec3 =
-                    points.iter().zip(weights).map(|(point, weight)| DVec3::from(end[*point as usize]) * weight).sum();
-                let velocity = obstacle.velocity_of(query.times[1], &points, &weights) + direction * speed;
-                (contact.points, contact.weights, contact.normal) = (own.0, own.1, overlap.direction);
-                (contact.offset, contact.velocity) = (direction.dot(&reached) - allowed, velocity.into());
-            }
-            out.push(contact);
+            });
+        };
+        let gaps = [other.thickness, 0.0];
+        let body = Side::new(query.from, &first.touching, &first.surface, gaps);
+        let solid = Side::new(&start, &other.surface.vertices, &other.surface, gaps);
+        let exits = body.exits(&solid, body.candidates, normal);
+        for exit in &exits {
+            let shares = solid.weights(&body, exit, normal);
+            let corners = other.surface.triangles[exit.face as usize];
+            push(exit, ([exit.point, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]), (&corners, &shares));
         }
-        pushed
+        for exit in solid.exits(&body, solid.candidates, -normal) {
+            let [a, b, c] = first.surface.triangles[exit.face as usize];
+            let [u, v, w] = body.weights(&solid, &exit, -normal);
+            push(&exit, ([a, b, c, 0], [u, v, w, 0.0]), (&[exit.point], &[1.0]));
+        }
+        exits.iter().map(|exit| exit.point).collect()
     }
 
     /// Where contact points at `x` are at the end of the frame.
@@ -337,38 +344,58 @@ impl CollisionScene<'_> {
             found.deepest = heights.fold(found.deepest, |deepest, height| deepest.max(ground.thickness - height));
         }
         let ends: Vec<_> = self.obstacles.iter().map(|obstacle| obstacle.at(1.0)).collect();
-        let obstacles = self.obstacles.iter().zip(&ends);
-        let obstacles = obstacles.map(|(obstacle, at)| (None, &obstacle.surface, &at[..], obstacle.thickness));
-        let skins = self.skins.iter().enumerate();
-        let skins =
-            skins.filter_map(|(index, skin)| Some((Some(index), &skin.surface, x, self.body_contact?.thickness)));
-        let (mut inside, mut within) = (vec![false; x.len()], vec![false; x.len()]);
+        let obstacles = self
+            .obstacles
+            .iter()
+            .zip(&ends)
+            .map(|(obstacle, at)| (None, SolidShape { surface: &obstacle.surface, at, gap: obstacle.thickness }));
+        let skins = self.skins.iter().enumerate().filter_map(|(index, skin)| {
+            Some((Some(index), SolidShape { surface: &skin.surface, at: x, gap: self.body_contact?.thickness }))
+        });
+        let mut inside = vec![false; x.len()];
         let boxes: Vec<_> = self.skins.iter().map(|skin| skin_bounds(skin, x)).collect();
-        for (own, surface, at, gap) in obstacles.chain(skins).filter(|(_, surface, _, _)| surface.closed) {
-            let around = bounds(surface.vertices.iter().map(|vertex| at[*vertex as usize]));
+        for (own, solid) in obstacles.chain(skins).filter(|(_, solid)| solid.surface.closed) {
+            let around = bounds(solid.surface.vertices.iter().map(|vertex| solid.at[*vertex as usize]));
             let others =
                 (0..).zip(self.skins).filter(|(skin, _)| Some(*skin) != own && overlap(&boxes[*skin], &around));
             let near = others.flat_map(|(_, skin)| &skin.touching).copied();
-            let mut near: Vec<u32> = near.filter(|point| overlap(&[x[*point as usize]; 2], &around)).collect();
-            if !near.is_empty() {
-                within.fill(false);
-                Enclosure::new(at, &surface.triangles, 0.0).mark(x, &near, &mut within);
-                near.retain(|point| within[*point as usize]);
-            }
-            if near.is_empty() {
-                continue;
-            }
-            // Points outside are left to contacts, which know how near they are.
-            let tree = TriangleTree::build(&narrow(at), &surface.triangles);
-            let from: Vec<_> = near.iter().map(|point| to_f32(x[*point as usize].into())).collect();
-            for (point, closest) in near.iter().zip(tree.closest_each(&from, f32::INFINITY)) {
-                let Some(distance) = closest.map(|closest| f64::from(closest.distance)) else { continue };
-                inside[*point as usize] |= distance > TOUCHING * gap;
-                found.deepest = found.deepest.max(gap + distance);
-            }
+            let near: Vec<u32> = near.filter(|point| overlap(&[x[*point as usize]; 2], &around)).collect();
+            solid.depths(x, &near, &mut inside, &mut found.deepest);
         }
         found.inside = inside.iter().filter(|inside| **inside).count();
         found
+    }
+}
+
+/// A surface that keeps points out.
+struct SolidShape<'a> {
+    surface: &'a TriangleSurface,
+    at: &'a [[f64; 3]],
+    gap: f64,
+}
+
+impl SolidShape<'_> {
+    /// Marks those of the `near` points that are `inside`, and raises `deepest` to the largest depth of one below the gap.
+    /// Points outside are left to contacts, which know how near they are.
+    fn depths(&self, points: &[[f64; 3]], near: &[u32], inside: &mut [bool], deepest: &mut f64) {
+        if near.is_empty() {
+            return;
+        }
+        let mut within = vec![false; points.len()];
+        Enclosure::new(self.at, &self.surface.triangles, 0.0).mark(points, near, &mut within);
+        let within: Vec<u32> = near.iter().filter(|point| within[**point as usize]).copied().collect();
+        if within.is_empty() {
+            return;
+        }
+        let narrow = |p: &[f64; 3]| to_f32(DVec3::from(*p));
+        let corners: Vec<_> = self.at.iter().map(narrow).collect();
+        let tree = TriangleTree::build(&corners, &self.surface.triangles);
+        let from: Vec<_> = within.iter().map(|point| narrow(&points[*point as usize])).collect();
+        for (point, closest) in within.iter().zip(tree.closest_each(&from, f32::INFINITY)) {
+            let Some(distance) = closest.map(|closest| f64::from(closest.distance)) else { continue };
+            inside[*point as usize] |= distance > TOUCHING * self.gap;
+            *deepest = deepest.max(self.gap + distance);
+        }
     }
 }
 

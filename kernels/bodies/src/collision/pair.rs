@@ -34,6 +34,33 @@ struct Pair<'a> {
     rules: ContactRules,
 }
 
+/// Marks the neighbourhood of some points, by the number of the query that marked them last.
+#[derive(Default)]
+struct Marks {
+    of: Vec<u32>,
+    last: u32,
+}
+
+impl Marks {
+    fn put(&mut self, skin: &BodySkin, particles: &[u32]) {
+        if self.of.is_empty() || self.last == u32::MAX {
+            self.of = vec![0; skin.len()];
+            self.last = 0;
+        }
+        self.last += 1;
+        for other in particles.iter().flat_map(|particle| skin.around(*particle)) {
+            self.of[*other as usize] = self.last;
+        }
+    }
+
+    fn have(&self, skin: &BodySkin, points: &[u32]) -> bool {
+        let marked = |point: &u32| self.of[*point as usize] == self.last;
+        points
+            .iter()
+            .any(|point| if skin.rides(*point) { skin.around(*point).iter().any(marked) } else { marked(point) })
+    }
+}
+
 /// Swept boxes of a skin.
 struct Boxes<'a> {
     /// Bounds of all its particles.
@@ -91,12 +118,13 @@ impl Pair<'_> {
         let poses = [self.query.from, self.query.to];
         let [first, second] = self.skins;
         let on = MovingSurface { surface: &second.surface, poses: &poses };
-        let find_in = |particles: &[u32], out: &mut Vec<Contact>| {
+        let find_in = |marks: &mut Marks, particles: &[u32], out: &mut Vec<Contact>| {
             let (mut faces, mut hits) = (Vec::new(), Vec::new());
             for particle in particles {
                 boxes.faces.overlapping(&self.points[*particle as usize], &mut faces);
                 if self.self_contact {
-                    faces.retain(|face| !first.is_near(&[*particle], &first.surface.triangles[*face as usize]));
+                    marks.put(first, &[*particle]);
+                    faces.retain(|face| !marks.have(first, &first.surface.triangles[*face as usize]));
                 }
                 if faces.is_empty() {
                     continue;
@@ -122,14 +150,16 @@ impl Pair<'_> {
         let [first, second] = self.skins;
         let [one, two] = [first, second].map(|skin| MovingSurface { surface: &skin.surface, poses: &poses });
         let indices: Vec<u32> = (0..first.surface.edges.len() as u32).collect();
-        let find_in = |edges: &[u32], out: &mut Vec<Contact>| {
+        let find_in = |marks: &mut Marks, edges: &[u32], out: &mut Vec<Contact>| {
             let mut others = Vec::new();
             for index in edges {
                 let edge = &first.surface.edges[*index as usize];
                 boxes.edges.overlapping(&swept::bounds_of(&edge.ends, self.points), &mut others);
                 if self.self_contact {
-                    let ends = |other: u32| &first.surface.edges[other as usize].ends;
-                    others.retain(|other| *other > *index && !first.is_near(&edge.ends, ends(*other)));
+                    marks.put(first, &edge.ends);
+                    others.retain(|other| {
+                        *other > *index && !marks.have(first, &first.surface.edges[*other as usize].ends)
+                    });
                 }
                 for other_index in &others {
                     let other = &second.surface.edges[*other_index as usize];

@@ -16,8 +16,9 @@ pub(super) struct TriangleSurface {
     pub(super) edges: Vec<Edge>,
     /// Edges of each triangle, from corner k to k + 1.
     sides: Vec<[u32; 3]>,
-    /// An end and an index of each edge, twice, in ascending order.
-    edges_by_end: Vec<[u32; 2]>,
+    /// Edges at each point.
+    starts: Vec<u32>,
+    around: Vec<u32>,
     /// Points used by triangles, ascending.
     pub(super) vertices: Vec<u32>,
     /// Whether every edge has two consistently oriented triangles.
@@ -61,8 +62,8 @@ impl<'a> Moment<'a> {
 }
 
 impl TriangleSurface {
-    /// Connectivity of `triangles`.
-    pub(super) fn new(triangles: &[[u32; 3]]) -> Self {
+    /// Connectivity of `triangles` over `points` points; indices must be in range.
+    pub(super) fn new(points: usize, triangles: &[[u32; 3]]) -> Self {
         let mut halves: Vec<([u32; 2], u32, u32)> = Vec::with_capacity(3 * triangles.len());
         for (face, corners) in (0u32..).zip(triangles).filter(|(_, [a, b, c])| a != b && b != c && c != a) {
             for k in 0..3u32 {
@@ -75,7 +76,8 @@ impl TriangleSurface {
             triangles: triangles.to_vec(),
             edges: Vec::with_capacity(halves.len() / 2),
             sides: vec![[NONE; 3]; triangles.len()],
-            edges_by_end: Vec::with_capacity(halves.len()),
+            starts: vec![0; points + 1],
+            around: Vec::new(),
             vertices: Vec::new(),
             closed: !halves.is_empty(),
         };
@@ -91,20 +93,34 @@ impl TriangleSurface {
             }
             let forwards = group.iter().filter(|half| triangles[half.1 as usize][half.2 as usize] == edge.ends[0]);
             surface.closed &= group.len() == 2 && forwards.count() == 1;
-            surface.edges_by_end.extend(edge.ends.map(|end| [end, index]));
             surface.edges.push(edge);
         }
-        surface.edges_by_end.sort_unstable();
-        surface.vertices.extend(surface.edges_by_end.iter().map(|[end, _]| end));
-        surface.vertices.dedup();
+        surface.gather_edges(points);
         surface
+    }
+
+    fn gather_edges(&mut self, points: usize) {
+        let ends = || self.edges.iter().flat_map(|edge| edge.ends);
+        for end in ends() {
+            self.starts[end as usize + 1] += 1;
+        }
+        self.vertices = (0..points as u32).filter(|point| self.starts[*point as usize + 1] > 0).collect();
+        for point in 0..points {
+            self.starts[point + 1] += self.starts[point];
+        }
+        let mut next = self.starts.clone();
+        let mut around = vec![0; 2 * self.edges.len()];
+        for (index, end) in ends().enumerate() {
+            around[next[end as usize] as usize] = (index / 2) as u32;
+            next[end as usize] += 1;
+        }
+        self.around = around;
     }
 
     /// Edges at a point.
     pub(super) fn edges_at(&self, point: u32) -> impl Iterator<Item = &Edge> {
-        let first = self.edges_by_end.partition_point(|[end, _]| *end < point);
-        let mine = self.edges_by_end[first..].iter().take_while(move |[end, _]| *end == point);
-        mine.map(|[_, edge]| &self.edges[*edge as usize])
+        let range = self.starts[point as usize] as usize..self.starts[point as usize + 1] as usize;
+        self.around[range].iter().map(|edge| &self.edges[*edge as usize])
     }
 
     #[inline]

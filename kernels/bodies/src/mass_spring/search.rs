@@ -177,9 +177,10 @@ impl StageSolver {
         if self.measured {
             x.copy_from_slice(&turned);
             self.assemble(context, stage, x, false);
-            return true;
+        } else {
+            velocities(&context.body.order.clusters, x, stage, &mut self.v);
         }
-        false
+        self.measured
     }
 
     /// The objective ½(x − y)ᵀM(x − y) + a²·(potentials) without contacts, at positions for which
@@ -225,7 +226,9 @@ impl StageSolver {
     fn store_noncontact_residual(&mut self, stage: &Stage<'_>) {
         self.noncontact_residual.clone_from(&self.r);
         for (contact, state) in stage.contacts.iter().zip(&self.contact_states) {
-            contact.push(state.force * (-stage.a * stage.a), &mut self.noncontact_residual);
+            for (particle, weight) in contact.sides().filter(|side| !self.system.held[side.0]) {
+                self.noncontact_residual[particle] -= state.force * (weight * stage.a * stage.a);
+            }
         }
     }
 
