@@ -141,7 +141,8 @@ pub fn bend_on(path: Path, starts: &[u32], points: &[[f32; 3]], bend: &Bend<'_>)
         return Bent { points: points.to_vec(), max_angle: 0.0, length_error: 0.0 };
     }
     let bend = &Bend { envelope: bend.envelope.filter(|envelope| !is_full(envelope)), ..bend.clone() };
-    let mut out = vec![[0.0; 3]; points.len()];
+    // All are written. A copy takes the same time whatever memory it gets; zeros depend on whether that was used before.
+    let mut out = points.to_vec();
     let reached = parallel::map(tasks(starts, &mut out), |_, task| {
         let mut scratch = Scratch::default();
         let (mut reached, mut out) = (Reached::default(), task.out);
