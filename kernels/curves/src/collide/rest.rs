@@ -21,8 +21,8 @@ const BATCH_CURVES: usize = 64;
 /// `offset_root` of [`Collide`], and on whether its `loft` is 0. Keep it and pass it in [`Collide::at_rest`] while these
 /// and the curves do not change.
 ///
-/// It is found at its first use. Threads that use it at the same time share that work: none waits for another, and little
-/// is found twice.
+/// It is found at its first use. Threads that use it at the same time share that work. None waits for another, so that a few
+/// batches are examined twice; results are the same.
 #[derive(Debug)]
 pub struct AtRest {
     batches: Vec<Batch>,
@@ -83,7 +83,7 @@ impl AtRest {
                 let _ = batch.grown.set(grown(n));
             }
         });
-        // Of each thread beside this one, the batch that it is at.
+        // Batches that other threads have claimed and not finished: waiting for them could deadlock a pool.
         for (n, batch) in self.batches.iter().enumerate() {
             if batch.grown.get().is_none() {
                 let _ = batch.grown.set(grown(n));
@@ -91,8 +91,8 @@ impl AtRest {
         }
     }
 
-    /// Counts a use, and finds half-spaces from the second one on. What another use is finding at the same time stays
-    /// unknown to this one.
+    /// Counts a use, and finds half-spaces from the second one on. Those that another thread is finding are not waited for:
+    /// they save time and change no result.
     pub(super) fn used(&self, path: Path, starts: &[u32], rest: &[Vec3], how: &Collide<'_>) {
         let is_first = self.uses.fetch_add(1, Ordering::Relaxed) == 0;
         if is_first || how.skin.is_none() || self.batches.iter().all(|batch| batch.half_spaces.get().is_some()) {
