@@ -197,6 +197,16 @@ impl SoftBody {
         self.ends.iter().map(|ends| ends.map(|end| self.order.caller_of[end as usize])).collect()
     }
 
+    /// Stiffness k of each spring, N/m.
+    pub fn stiffnesses(&self) -> &[f64] {
+        &self.stiffness
+    }
+
+    /// Rest length of each spring before any plastic flow or reset, metres.
+    pub fn lengths(&self) -> &[f64] {
+        &self.lengths
+    }
+
     /// Rest position of a particle, by the caller's index, metres.
     pub fn rest_point(&self, particle: usize) -> [f64; 3] {
         self.rest[self.order.index_of[particle] as usize].into()
@@ -210,6 +220,15 @@ impl SoftBody {
     /// Mass of each particle, by the caller's index, kilograms.
     pub fn masses(&self) -> Vec<f64> {
         self.order.index_of.iter().map(|particle| self.mass[*particle as usize]).collect()
+    }
+
+    /// The regions whose volume is preserved: the boundary triangles of each, facing outwards, by the caller's
+    /// indices.
+    pub fn regions(&self) -> Vec<Vec<[u32; 3]>> {
+        let caller = |particle: u32| self.order.caller_of[particle as usize];
+        (0..self.regions.len())
+            .map(|region| self.regions.around(region).map(|face| face.map(caller)).collect())
+            .collect()
     }
 
     /// Longest side of the bounding box at rest, metres: the length that tolerances are relative to.

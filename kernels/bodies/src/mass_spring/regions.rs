@@ -92,6 +92,13 @@ impl Regions {
         self.damping = weighed.iter().zip(&all).map(|(sum, all)| if *all > 0.0 { sum / all } else { 0.0 }).collect();
     }
 
+    /// The boundary triangles of a region, outwards.
+    pub(super) fn around(&self, region: usize) -> impl Iterator<Item = [u32; 3]> {
+        let corners = self.of(region);
+        let faces = &self.faces[self.face_starts[region] as usize..self.face_starts[region + 1] as usize];
+        faces.iter().map(|face| face.map(|corner| corners[usize::from(corner)]))
+    }
+
     /// The particles on the boundary of a region.
     pub(super) fn of(&self, region: usize) -> &[u32] {
         &self.particles[self.starts[region] as usize..self.starts[region + 1] as usize]
@@ -162,6 +169,17 @@ mod tests {
         assert!(gradient.iter().sum::<DVec3>().norm() < 1e-9);
         regions.set_material(&[1.0 / 6.0; 6], &[30.0; 6], &[0.5; 6]);
         assert!((regions.energy[0] - 30.0).abs() < 1e-12 && (regions.damping[0] - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_boundary_of_a_region_encloses_its_volume() {
+        let (points, tets) = cube();
+        let regions = Regions::new(&points, &tets);
+        let enclosed = |[a, b, c]: [u32; 3]| {
+            let [a, b, c] = [a, b, c].map(|corner| points[corner as usize]);
+            a.dot(&b.cross(&c)) / 6.0
+        };
+        assert!((regions.around(0).map(enclosed).sum::<f64>() - 1.0).abs() < 1e-12);
     }
 
     #[test]
