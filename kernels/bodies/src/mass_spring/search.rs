@@ -177,10 +177,10 @@ impl StageSolver {
         if self.measured {
             x.copy_from_slice(&turned);
             self.assemble(context, stage, x, false);
-        } else {
-            velocities(&context.body.order.clusters, x, stage, &mut self.v);
+            return true;
         }
-        self.measured
+        velocities(&context.body.order.clusters, x, stage, &mut self.v);
+        false
     }
 
     /// The objective ½(x − y)ᵀM(x − y) + a²·(potentials) without contacts, at positions for which
