@@ -276,19 +276,8 @@ fn rest_roots(cx: &FrameCx, curves: &Component) -> Result<Option<Vec<[f32; 3]>>>
     if !rest_from_start(cx.params()) {
         return Ok(None);
     }
-    let rest = match curves.get(PREF) {
-        Some(rest) => rest,
-        None => {
-            let start = cx.part_at_start(CURVES);
-            if start.runs() != curves.runs() {
-                return Err(Error::refused(
-                    "`noise_space` is \"rest\", but the curves are not those of the first frame",
-                )
-                .hint("give the curves a `Pref`, or use \"world\""));
-            }
-            start.positions()
-        }
-    };
+    let or_else = "give the curves a `Pref`, or set `noise_space` to \"world\"";
+    let rest = cx.at_rest(CURVES, curves).map_err(|error| error.hint(or_else))?;
     Ok(Some(curves.runs().ranges().map(|cvs| rest[cvs.start]).collect()))
 }
 

@@ -88,7 +88,7 @@ fn a_limit_too_short_to_start_within_is_said() {
     let args = ["study", "g.json", "--extremes", "--limit", "0.001ms"];
     let ended = Bench::with_graph(BLADE).run(&args);
     assert_eq!(ended.code, Some(4), "{}", ended.stderr);
-    assert!(ended.stderr.contains("no frame in 1e-6 s; set a longer --limit"), "{}", ended.stderr);
+    assert!(ended.stderr.contains("no frame cooked within 1e-6 s; set a longer --limit"), "{}", ended.stderr);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Curve_Free: moves CVs across their curve.
 //!
-//! Say here which paper and section it implements, and where and why it departs from it.
+//! If it implements a paper, say here which one, which section, and where and why it departs from it.
 
 use engine::prelude::*;
 

@@ -1,6 +1,6 @@
 //! Curve_Full: moves CVs across their curve.
 //!
-//! Say here which paper and section it implements, and where and why it departs from it.
+//! If it implements a paper, say here which one, which section, and where and why it departs from it.
 
 use engine::prelude::*;
 use numerics::ramp::Ramp;
@@ -9,7 +9,8 @@ use std::f32::consts::TAU;
 use std::sync::Arc;
 
 inputs! { INPUTS:
-    CURVES: Input = Input::one("curves", Kind::Curves, "The curves to move, root first.");
+    CURVES: Input = Input::one("curves", Kind::Curves, "The curves to move, root first. Their shape at rest is `Pref`, \
+        or else their shape at the scene's first frame.").read_at(|_| Times::NOW.and(Times::START));
 }
 
 params! { PARAMS:
@@ -35,7 +36,7 @@ pub(crate) static NODE: Node = Node::new(
 .inputs(INPUTS)
 .params(PARAMS)
 .outputs(&[&OUT])
-.reads(&[&P, &CURVE_ID])
+.reads(&[&P, &PREF, &CURVE_ID])
 .writes(&[&P])
 .metrics(METRICS)
 .neutral(|params, _| (params.get(BEND).value == 0.0).then_some("`bend` is 0"));
@@ -46,7 +47,8 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
     let ramp = cx.get(FALLOFF);
     // Seconds are reduced in f64: late frames keep their precision.
     let swing = sin(TAU * cx.seconds().fract() as f32 + 1.0);
-    let moved = CurveLoop::over(&curves).seeded(cx.get(SEED)).keeping_lengths().map(|curve, out| {
+    let rest = cx.at_rest(CURVES, &curves)?;
+    let moved = CurveLoop::over(&curves).framed_by(rest).seeded(cx.get(SEED)).keeping_lengths().map(|curve, out| {
         let own = curve.random(0);
         for cv in curve.cvs() {
             let offset = amount.at(cv.row) * ramp.eval(cv.u) * own * swing;

@@ -63,8 +63,8 @@ fn an_egg_drapes_over_the_rim_with_its_yolk_inside() {
         overlap += inside(own, &white_tets, other) + inside(other, &yolk_tets, own);
     }
     let last = points(&eggs[59]);
-    let below = |side: fn(f64) -> bool| last[..white].iter().filter(|p| p[1] < -2e-3 && side(p[0])).count();
-    let (inner, outer) = (below(|x| x < 0.095), below(|x| x > 0.1));
+    let below = |side: fn(f64) -> bool| last[..white].iter().filter(|p| p[1] < -2e-3 && side(p[2])).count();
+    let (inner, outer) = (below(|z| z < 0.095), below(|z| z > 0.1));
     let torn = metrics["egg"]["torn"].values().copied().fold(0.0, f64::max);
     println!(
         "egg_crack: {} pinned particles within {worst:.1e} m of their pins, {overlap} points of yolk and white in each other",

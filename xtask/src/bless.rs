@@ -70,7 +70,11 @@ pub(crate) fn store(root: &Path, named: &[Expectation]) -> Result<String, String
     }
     let files: Vec<&str> = all.iter().flat_map(|expectation| expectation.files()).copied().collect();
     run("git", &[&["--no-pager", "diff", "--stat", "--patch", "--"], &files[..]].concat())?;
-    if failed.is_empty() { Ok("stored; commit the changes you intended".into()) } else { Err(failed.join("\n")) }
+    if failed.is_empty() {
+        Ok("stored; what changed since the last commit is above".into())
+    } else {
+        Err(failed.join("\n"))
+    }
 }
 
 #[cfg(test)]

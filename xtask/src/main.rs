@@ -34,6 +34,9 @@ enum Chore {
         /// Give each curve random numbers
         #[arg(long)]
         seed: bool,
+        /// Give each curve its shape at rest, whose directions it is moved across
+        #[arg(long)]
+        rest: bool,
         /// Let segments change their lengths; without it the node restores them and measures how well
         #[arg(long)]
         free_lengths: bool,
@@ -59,8 +62,8 @@ enum Time {
 
 fn main() -> ExitCode {
     let result = match Chore::parse() {
-        Chore::NewNode { name, family, time, mask, ramp, seed, free_lengths } => {
-            let options = template::Options { reads_clock: time == Time::Frame, mask, ramp, seed, free_lengths };
+        Chore::NewNode { name, family, time, mask, ramp, seed, rest, free_lengths } => {
+            let options = template::Options { reads_clock: time == Time::Frame, mask, ramp, seed, rest, free_lengths };
             new_node::write(&root(), &name, &family, &options)
         }
         Chore::Bless { expectations } => bless::store(&root(), &expectations),

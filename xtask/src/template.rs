@@ -11,6 +11,8 @@ pub(crate) struct Options {
     pub(crate) ramp: Option<String>,
     /// Whether it has random numbers.
     pub(crate) seed: bool,
+    /// Whether it knows the curves' shape at rest.
+    pub(crate) rest: bool,
     /// Whether segments may change their lengths.
     pub(crate) free_lengths: bool,
 }
@@ -27,6 +29,8 @@ pub(crate) fn render(name: &str, options: &Options) -> String {
             "ramp" => options.ramp.is_some(),
             "seed" => options.seed,
             "no seed" => !options.seed,
+            "rest" => options.rest,
+            "no rest" => !options.rest,
             "kept" => !options.free_lengths,
             "free" => options.free_lengths,
             tag => unreachable!("the template has an unknown tag `{tag}`"),
@@ -42,6 +46,11 @@ pub(crate) fn render(name: &str, options: &Options) -> String {
     ];
     let factors: Vec<&str> = factors.into_iter().flatten().collect();
     let lines = TEMPLATE.lines().filter(keep).map(|line| line.split("//?").next().unwrap_or(line).trim_end());
+    let frames = if options.rest { ".framed_by(rest)" } else { "" };
+    let seeded = if options.seed { ".seeded(cx.get(SEED))" } else { "" };
+    let kept = if options.free_lengths { "" } else { ".keeping_lengths()" };
+    let read = ["&P", "&PREF", "&CURVE_ID"].into_iter().zip([true, options.rest, options.seed]);
+    let read: Vec<&str> = read.filter_map(|(attribute, is_read)| is_read.then_some(attribute)).collect();
     let text: String = lines.map(|line| format!("{line}\n")).collect();
     text.replace("NODE_NAME", name)
         .replace(
@@ -49,7 +58,8 @@ pub(crate) fn render(name: &str, options: &Options) -> String {
             if options.mask.is_some() { "params.get(AMOUNT_CONST).value" } else { "params.get(AMOUNT_CONST)" },
         )
         .replace("AMOUNT_SET", if options.mask.is_some() { "0.5.into()" } else { "0.5" })
-        .replace(".KEEPING", if options.free_lengths { "" } else { ".keeping_lengths()" })
+        .replace(".OPTIONS", &[frames, seeded, kept].concat())
+        .replace("ATTRIBUTES", &read.join(", "))
         .replace("AMOUNT_PARAM", amount)
         .replace("RAMP_PARAM", ramp)
         .replace("FACTORS", &factors.join(" * "))
@@ -60,7 +70,7 @@ pub(crate) fn render(name: &str, options: &Options) -> String {
 /// Lines that end in `//? tag` are kept only with that option.
 const TEMPLATE: &str = r#"//! NODE_NAME: moves CVs across their curve.
 //!
-//! Say here which paper and section it implements, and where and why it departs from it.
+//! If it implements a paper, say here which one, which section, and where and why it departs from it.
 
 use engine::prelude::*;
 use numerics::ramp::Ramp; //? ramp
@@ -69,7 +79,9 @@ use std::f32::consts::TAU; //? frame
 use std::sync::Arc; //? ramp
 
 inputs! { INPUTS:
-    CURVES: Input = Input::one("curves", Kind::Curves, "The curves to move, root first.");
+    CURVES: Input = Input::one("curves", Kind::Curves, "The curves to move, root first."); //? no rest
+    CURVES: Input = Input::one("curves", Kind::Curves, "The curves to move, root first. Their shape at rest is `Pref`, \ //? rest
+        or else their shape at the scene's first frame.").read_at(|_| Times::NOW.and(Times::START)); //? rest
 }
 
 params! { PARAMS:
@@ -99,8 +111,7 @@ pub(crate) static NODE: Node = Node::new(
 .inputs(INPUTS)
 .params(PARAMS)
 .outputs(&[&OUT])
-.reads(&[&P]) //? no seed
-.reads(&[&P, &CURVE_ID]) //? seed
+.reads(&[ATTRIBUTES])
 .writes(&[&P])
 .metrics(METRICS) //? kept
 .neutral(|params, _| (AMOUNT_VALUE == 0.0).then_some("`AMOUNT_PARAM` is 0"));
@@ -113,8 +124,8 @@ fn cook(cx: &FrameCx) -> Result<Outputs> { //? frame
     let ramp = cx.get(RAMP_CONST); //? ramp
     // Seconds are reduced in f64: late frames keep their precision. //? frame
     let swing = sin(TAU * cx.seconds().fract() as f32 + 1.0); //? frame
-    let moved = CurveLoop::over(&curves).KEEPING.map(|curve, out| { //? no seed
-    let moved = CurveLoop::over(&curves).seeded(cx.get(SEED)).KEEPING.map(|curve, out| { //? seed
+    let rest = cx.at_rest(CURVES, &curves)?; //? rest
+    let moved = CurveLoop::over(&curves).OPTIONS.map(|curve, out| {
         let own = curve.random(0); //? seed
         for cv in curve.cvs() {
             let offset = FACTORS;
@@ -161,6 +172,7 @@ mod tests {
             mask: Some("bend".into()),
             ramp: Some("falloff".into()),
             seed: true,
+            rest: true,
             free_lengths: false,
         };
         let free = Options { free_lengths: true, seed: true, ..Options::default() };

@@ -109,12 +109,13 @@ fn check_others(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mut Fi
     }
 }
 
-/// The first attribute whose removal alone changes the result.
+/// The first undeclared attribute whose removal alone changes the result.
 fn culprit(subject: &Subject, trial: &Trial, ignore: &dyn Fn(&str) -> bool) -> Option<String> {
     let frames = subject.frames();
     let before = subject.run(trial, &frames).digest(ignore);
-    let names = samples::usual().into_iter().map(|(name, _, _)| name);
-    names.into_iter().find_map(|name| {
+    let declared = |name: &str| subject.node.reads.iter().any(|read| read.spec().0 == name);
+    let mut names = samples::usual().into_iter().map(|(name, _, _)| name).filter(|name| !declared(name));
+    names.find_map(|name| {
         let without = Trial { without: Some(name.clone()), ..trial.clone() };
         (subject.run(&without, &frames).digest(ignore) != before).then(|| format!("`{name}`"))
     })

@@ -17,6 +17,12 @@ fn a_node_that_is_neutral_too_often_is_found() {
 }
 
 #[test]
+fn a_node_that_is_neutral_below_a_threshold_is_found() {
+    let neutral = |params: &Params, _: &Wires| (params.get(AMOUNT) <= 0.03).then_some("`amount` is small");
+    finds_only(GOOD.neutral(neutral), "it is declared neutral (`amount` is small), but its `cook` moves points");
+}
+
+#[test]
 fn an_undeclared_curve_id_is_found() {
     let node = shift(|cx| {
         let mut curves = cx.edit(CURVES);

@@ -18,6 +18,15 @@ fn undeclared_reads_are_found() {
 }
 
 #[test]
+fn a_read_at_a_time_that_the_input_does_not_name_is_found() {
+    let early = shift(|cx| {
+        let first = cx.part_at_start(CURVES).positions().first().map_or(0.0, |point| point[1]);
+        Ok(OUT.with(up(cx, cx.get(AMOUNT) + first)?))
+    });
+    finds(early, "the input `curves` is read at the start, which its `read_at` does not name");
+}
+
+#[test]
 fn undeclared_reads_behind_a_choice_a_switch_and_a_missing_wire_are_found() {
     let node = shift(|cx| {
         let hidden = cx.get(WAY) == Way::Along && cx.get(TWICE) && cx.input(OTHER).is_none();

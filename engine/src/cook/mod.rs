@@ -76,7 +76,7 @@ pub enum Stopped<E> {
 
 /// Cooks graphs, and remembers between cooks what stood still.
 pub struct Engine {
-    pool: rayon::ThreadPool,
+    pool: Arc<rayon::ThreadPool>,
     memory: usize,
     ceiling: Ceiling,
     store: Mutex<Store>,
@@ -101,7 +101,7 @@ impl Engine {
         let store = Mutex::new(Store::new(settings.memory / 2));
         let files = Arc::new(Files::within(settings.ceiling));
         let Settings { memory, ceiling, .. } = *settings;
-        Ok(Self { pool, memory, ceiling, store, files, compares: false, verified: Mutex::default() })
+        Ok(Self { pool: Arc::new(pool), memory, ceiling, store, files, compares: false, verified: Mutex::default() })
     }
 
     /// From now on, cooks compare results at consecutive samples, for metrics such as [`crate::node::Metric::jumps`].
@@ -177,7 +177,7 @@ impl Engine {
         let plan = self.plan(graph, request)?;
         let cancel = AtomicBool::new(false);
         let fresh = Self {
-            pool: rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("one thread"),
+            pool: self.pool.clone(),
             memory: self.memory,
             ceiling: self.ceiling,
             store: Mutex::new(Store::new(usize::MAX)),

@@ -19,6 +19,8 @@ const CVS_OF_A_THREAD: usize = 1024;
 #[derive(Clone, Copy)]
 pub struct CurveLoop<'a> {
     curves: &'a Component,
+    /// What frames follow.
+    shape: &'a [Vec3],
     seed: Seed,
     keeps_lengths: bool,
 }
@@ -29,7 +31,7 @@ pub struct CurveLoop<'a> {
 pub struct MovedCurves<T> {
     /// A position for every CV, metres.
     pub points: Vec<Vec3>,
-    /// The largest change of a segment's length, as a share of its curve's length: for [`super::Metric::length_error`].
+    /// The largest change of a segment's length, as a share of [`CurveView::length`]: for [`super::Metric::length_error`].
     pub length_error: f64,
     /// What the node returned for each curve, in order.
     pub results: Vec<T>,
@@ -54,7 +56,7 @@ pub struct Cv {
     pub index: usize,
     /// Its row among all points of the component: for masks and other point attributes.
     pub row: usize,
-    /// Its position, metres.
+    /// Its incoming position, metres.
     pub point: Vec3,
     /// Arc length from the root ÷ the curve's length; 0 on a curve without length.
     pub u: f32,
@@ -78,7 +80,18 @@ struct Scratch {
 impl<'a> CurveLoop<'a> {
     /// A loop over `curves`, with random numbers of seed 0.
     pub fn over(curves: &'a Component) -> Self {
-        Self { curves, seed: Seed(0), keeps_lengths: false }
+        Self { curves, shape: curves.positions(), seed: Seed(0), keeps_lengths: false }
+    }
+
+    /// Frames, `u` and lengths are those of this shape of the curves, a position for each CV, instead of the incoming one: of the
+    /// shape at rest, for example ([`super::Cx::at_rest`]).
+    ///
+    /// # Panics
+    /// Where the numbers of CVs differ.
+    #[must_use]
+    pub fn framed_by(self, shape: &'a [Vec3]) -> Self {
+        assert_eq!(shape.len(), self.curves.point_count(), "a shape has a position for each CV");
+        Self { shape, ..self }
     }
 
     /// With random numbers of this seed. They belong to a curve's `curve_id` where there is one, otherwise to its
@@ -88,7 +101,7 @@ impl<'a> CurveLoop<'a> {
         Self { seed, ..self }
     }
 
-    /// Restores the length of every segment, root to tip, after the node has moved its CVs: the node then decides on
+    /// Restores the incoming length of every segment, root to tip, after the node has moved its CVs: the node then decides on
     /// directions alone.
     #[must_use]
     pub fn keeping_lengths(self) -> Self {
@@ -139,7 +152,7 @@ impl<'a> CurveLoop<'a> {
     ) -> (T, f64) {
         let rows = self.curves.runs().range(curve);
         let points = &self.curves.positions()[rows.clone()];
-        scratch.measure(points);
+        scratch.measure(&self.shape[rows.clone()]);
         let id = self.curves.get(CURVE_ID).map_or(curve as u64, |ids| u64::from(ids[curve].cast_unsigned()));
         let view = CurveView {
             index: curve,
@@ -322,6 +335,25 @@ mod tests {
         assert_eq!(all[1].iter().map(|cv| cv.u).collect::<Vec<_>>(), [0.0, 0.25, 0.5, 0.75, 1.0]);
         assert_eq!(all[2].iter().map(|cv| cv.u).collect::<Vec<_>>(), [0.0, 0.0, 0.5, 0.5, 1.0]);
         assert_eq!(all[4][1].u, 0.0);
+    }
+
+    #[test]
+    fn frames_can_follow_another_shape() {
+        let curves = samples();
+        // The straight curve lies along x at rest, twice as long.
+        let mut rest = curves.positions().to_vec();
+        for (k, point) in rest[40..45].iter_mut().enumerate() {
+            *point = [k as f32, 0.0, 0.0];
+        }
+        let all =
+            CurveLoop::over(&curves).framed_by(&rest).map(|curve, _| (curve.length, curve.cvs().collect::<Vec<_>>()));
+        let (length, cvs) = &all.results[1];
+        assert_eq!(*length, 4.0);
+        for (k, cv) in cvs.iter().enumerate() {
+            assert_eq!((cv.tangent, cv.point, cv.u), ([1.0, 0.0, 0.0], [5.0, 0.5 * k as f32, 0.0], 0.25 * k as f32));
+        }
+        assert_eq!(all.points, curves.positions(), "what the node does not write stays as it arrives");
+        assert_eq!(all.length_error, 0.0);
     }
 
     #[test]

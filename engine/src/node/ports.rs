@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use super::{Cx, Outputs};
-use crate::geometry::{Component, Geometry, Kind};
+use crate::error::{Error, Result};
+use crate::geometry::{Component, Geometry, Kind, PREF};
 use crate::param::Params;
 
 /// The number of wires that an input takes.
@@ -288,7 +289,7 @@ impl Cx<'_> {
 
     /// The geometry of an input at the start; see [`Times::start`].
     pub fn at_start<A: Wired>(&self, input: Input<A>) -> A::View<'_> {
-        A::view(&self.data(input.name()).start)
+        A::view(self.start_of(input.name()))
     }
 
     /// The component that an input needs, at the frame that is cooked; of a list of wires, the component of each.
@@ -304,6 +305,39 @@ impl Cx<'_> {
     /// # Panics
     /// As [`Cx::part`].
     pub fn part_at_start<A: Wired>(&self, input: Input<A>) -> A::Parts<'_> {
-        A::parts(&self.data(input.name()).start, input.kind())
+        A::parts(self.start_of(input.name()), input.kind())
+    }
+
+    /// The wires of an input at the start.
+    ///
+    /// # Panics
+    /// Where the input does not declare that it is read then.
+    fn start_of(&self, name: &'static str) -> &[Arc<Geometry>] {
+        let data = self.data(name);
+        assert!(
+            !data.start.is_empty() || data.now.is_empty(),
+            "the input `{name}` is read at the start, which its `read_at` does not name"
+        );
+        &data.start
+    }
+
+    /// Where the points of `part` are at rest, `part` being the component of that input: its `Pref`, a position for each point, or
+    /// else the input's positions at the start. The input is read then ([`Times::START`]), and [`PREF`] is declared.
+    ///
+    /// # Errors
+    /// Where neither has a position for each point.
+    pub fn at_rest<'a>(&'a self, input: Input<One>, part: &'a Component) -> Result<&'a [[f32; 3]]> {
+        if let Some(rest) = part.get(PREF) {
+            return Ok(rest);
+        }
+        let start = self.part_at_start(input);
+        if start.point_count() != part.point_count() || start.runs() != part.runs() {
+            let fact = format!(
+                "without `Pref`, the shape at rest of `{}` is that of the first frame, which has other points or elements",
+                input.name()
+            );
+            return Err(Error::refused(fact).hint("give it a `Pref`"));
+        }
+        Ok(start.positions())
     }
 }

@@ -239,6 +239,27 @@ fn rest_noise_sticks_to_a_moving_animal() {
 }
 
 #[test]
+fn rest_noise_needs_the_curves_of_the_first_frame_or_a_pref() {
+    let cooked = |has_rest: bool| {
+        let growing = move |frame: Frame| {
+            let mut geometry = field(if frame.number() < 2.0 { 2 } else { 3 });
+            let curves = geometry.part_mut(Kind::Curves).unwrap();
+            if has_rest {
+                curves.set(PREF, curves.positions().to_vec()).unwrap();
+            }
+            geometry
+        };
+        bench(&NODE).moving(CURVES, growing).set(NOISE_SPACE, Space::Rest).at(2.0).try_cook()
+    };
+    let refused = cooked(false).expect_err("the curves at rest are unknown");
+    let fact =
+        "without `Pref`, the shape at rest of `curves` is that of the first frame, which has other points or elements";
+    assert_eq!(refused.fact, fact);
+    assert_eq!(refused.hint.unwrap(), "give the curves a `Pref`, or set `noise_space` to \"world\"");
+    assert!(cooked(true).is_ok());
+}
+
+#[test]
 fn the_origin_of_the_scene_moves_the_noise_only() {
     let windy = bench(&NODE).input(CURVES, field(2));
     let at = |origin: [f64; 3], shift: f32| {

@@ -223,7 +223,7 @@ fn stopped(probed: &Probed, limit: Duration) -> String {
 }
 
 fn too_slow(limit: Duration) -> String {
-    format!("no frame in {} s; set a longer --limit", brief(limit.as_secs_f64()))
+    format!("no frame cooked within {} s; set a longer --limit", brief(limit.as_secs_f64()))
 }
 
 /// The param and its value as the table shows them.

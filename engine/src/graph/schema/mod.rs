@@ -137,7 +137,12 @@ fn shared_definitions() -> Map<String, Value> {
                         "description": "The attributes to write; all if left out.",
                         "type": "array", "items": {"type": "string", "minLength": 1},
                     },
-                    "v": {"description": "Whether to write velocities.", "type": "boolean", "default": false},
+                    "v": {
+                        "description": "Whether to write velocities `v`: those of the node where it has some, otherwise \
+                            the difference between a moment before and one after, divided by the time between. They are \
+                            whole frames apart behind a solver, and the frame after the last is cooked too.",
+                        "type": "boolean", "default": false,
+                    },
                 },
             }),
         ]),

@@ -23,6 +23,12 @@ impl Split {
         }
         split
     }
+
+    /// Along the three axes. `offset`: from the low corner of a cell to its value.
+    #[inline(always)]
+    fn along_axes([x, y, z]: &Lanes<3>, offset: [f32; 3]) -> [Self; 3] {
+        [Self::of(x, offset[0]), Self::of(y, offset[1]), Self::of(z, offset[2])]
+    }
 }
 
 /// The eight values around each place: pairs along x; y ascends first, then z.
@@ -35,10 +41,8 @@ impl ValuesAround {
     /// The values of a field; where not all are stored, eight times [`Sampler::value`].
     #[inline(always)]
     pub(super) fn of(sampler: &mut Sampler<'_>, field: &[f32], site: Site, places: &Lanes<3>) -> Self {
-        let offset = site.offset();
-        let [x, y, z] = places;
-        let along = [Split::of(x, offset[0]), Split::of(y, offset[1]), Split::of(z, offset[2])];
-        Self::between(sampler, field, site, [&along[0], &along[1], &along[2]], places)
+        let [x, y, z] = Split::along_axes(places, site.offset());
+        Self::between(sampler, field, site, [&x, &y, &z], places)
     }
 
     #[inline(always)]
@@ -74,9 +78,7 @@ impl ValuesAround {
         masks: &[FaceMask],
         bits: FaceMask,
     ) -> (Self, [bool; LANES]) {
-        let offset = site.offset();
-        let [x, y, z] =
-            [Split::of(&places[0], offset[0]), Split::of(&places[1], offset[1]), Split::of(&places[2], offset[2])];
+        let [x, y, z] = Split::along_axes(places, site.offset());
         let mut values = Self { pairs: [[[0.0; 2]; LANES]; 4], t: [x.t, y.t, z.t] };
         let mut found = [false; LANES];
         for lane in 0..LANES {
@@ -151,8 +153,8 @@ fn in_all(masks: &[FaceMask], at: [u32; 4]) -> FaceMask {
 #[inline(always)]
 pub(super) fn velocity(sampler: &mut Sampler<'_>, faces: &FaceFields<f32>, places: &Lanes<3>) -> Lanes<3> {
     // Between faces and between centres, along each axis.
-    let [x, y, z] = [Split::of(&places[0], 0.0), Split::of(&places[1], 0.0), Split::of(&places[2], 0.0)];
-    let [a, b, c] = [Split::of(&places[0], 0.5), Split::of(&places[1], 0.5), Split::of(&places[2], 0.5)];
+    let [x, y, z] = Split::along_axes(places, [0.0; 3]);
+    let [a, b, c] = Split::along_axes(places, [0.5; 3]);
     [
         ValuesAround::between(sampler, &faces[0], Site::FaceX, [&x, &b, &c], places).value(),
         ValuesAround::between(sampler, &faces[1], Site::FaceY, [&a, &y, &c], places).value(),
