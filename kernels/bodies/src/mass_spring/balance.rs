@@ -25,7 +25,7 @@ impl Stepper<'_> {
         let (body, external) = (self.context.body, self.context.external);
         let moved = |particle: usize| motion.x[particle] - start.x[particle];
         let clusters = &body.order.clusters;
-        let given = clusters.sum((), |cluster, ()| {
+        let given: f64 = clusters.sum((), |cluster, ()| {
             let of = |particle: usize| {
                 let ends = [times[1], h];
                 external.work(particle, body.mass[particle], ends, motion.x[particle], moved(particle))
@@ -47,8 +47,8 @@ impl Stepper<'_> {
         let pins: Vec<usize> = external.moving_pins().collect();
         let mut by_pins = 0.0;
         if !pins.is_empty() {
-            let stage = Stage { a: h, time: times[1], contacts, ..Stage::default() };
-            let force = self.solver.forces(&self.context, &stage, &motion.x, &motion.v);
+            let stage = Stage { contacts, ..Stage::new(self.context, [&[], &[]], h, times[1]) };
+            let force = self.solver.forces(&stage, &motion.x, &motion.v);
             let reaction = |pin: usize| (motion.v[pin] - start.v[pin]) * (body.mass[pin] / h) - force[pin];
             by_pins = pins.into_iter().map(|pin| reaction(pin).dot(&moved(pin))).sum();
         }

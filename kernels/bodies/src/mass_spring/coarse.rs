@@ -44,9 +44,7 @@ impl ContactFilters {
                 continue;
             }
             let mut block = system.blocks.get(particle).copied().unwrap_or_default();
-            if !system.transient.is_empty() {
-                system.transient.add_block(particle, 1.0, end, &mut block);
-            }
+            system.transient.add_block(particle, 1.0, end, &mut block);
             if system.held[particle] || block.iter().all(|x| *x == 0.0) {
                 continue;
             }

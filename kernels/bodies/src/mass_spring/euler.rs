@@ -88,9 +88,9 @@ impl Stepper<'_> {
         let scale = self.scale(&motion.x, &y, contacts, h);
         let mut enough = StopCriteria { share: EULER_SHARE, scale, square: 0.0, first: 0.0 };
         let mut solved = Solved::default();
-        let stage = Stage { y: &y, z: &z, a: h, time: times[1], line_search: true, ..Stage::default() };
+        let stage = Stage::new(self.context, [&y, &z], h, times[1]);
         for round in 1..=MOST_ROUNDS {
-            let again = self.solver.descend(&self.context, &stage, contacts, enough, self.cached, &mut x);
+            let again = self.solver.descend(&stage, contacts, enough, &mut x);
             solved = Solved { residual: again.residual, ..sum(solved, again) };
             (enough.square, enough.first) = (solved.enough, solved.first);
             let (mut found, missed) = self.find_missed(contacts, motion, &x, times);

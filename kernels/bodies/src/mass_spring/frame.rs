@@ -192,6 +192,7 @@ impl BodySolver {
         self.solver.lengths.clear();
         let before = measure(&mut self.solver, &context, 0.0, &motion, false);
         self.solver.lengths.clone_from(&self.solver.lengths_now);
+        self.solver.cached = std::mem::take(&mut state.cached);
         let mut stepper = Stepper {
             solver: &mut self.solver,
             context,
@@ -201,7 +202,6 @@ impl BodySolver {
                 Integrator::Accurate { tolerance } => Some(tolerance.max(1e-12) * body.size),
                 Integrator::Default | Integrator::Euler => None,
             },
-            cached: &mut state.cached,
             euler_steps_left: &mut state.euler_steps_left,
             energy_budget: &mut state.energy_budget,
             impacts: &mut state.impacts,
@@ -218,6 +218,7 @@ impl BodySolver {
         report.worst_stretch = worst_stretch(&context, &motion.x);
         report.lost_share = lost_share(report.energy_lost, [&before, &after], body, gravity.norm() * seconds);
         state.acceleration.resize(body.len(), [0.0; 3]);
+        state.cached = std::mem::take(&mut self.solver.cached);
         state.loads.clear();
         state.loads.extend(body.contact_indices().map(|point| motion.loads[point]));
         for (caller, particle) in body.order.index_of.iter().enumerate() {

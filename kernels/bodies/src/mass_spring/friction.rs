@@ -8,7 +8,7 @@
 
 use super::contact::ContactConstraint;
 use super::predictor::RigidMotion;
-use super::stage::{FrameContext, Stage, StageSolver};
+use super::stage::{Stage, StageSolver};
 use numerics::vector::DVec3;
 
 /// Force and torque left on a body, and change of the sum of its loads, that are tolerated, relative to that sum. They
@@ -61,8 +61,8 @@ struct PieceLoads {
 
 impl StageSolver {
     /// The balance of loads at `x`, for which the residual was just evaluated. Pinned pieces are in balance.
-    pub(super) fn balance(&self, context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3]) -> LoadBalance {
-        let body = context.body;
+    pub(super) fn balance(&self, stage: &Stage<'_>, x: &[DVec3]) -> LoadBalance {
+        let body = stage.context.body;
         let mut pieces = vec![PieceLoads::default(); body.order.pieces.len()];
         for contact in stage.contacts.iter().filter(|contact| contact.friction > 0.0) {
             let now = contact.load_at(x);

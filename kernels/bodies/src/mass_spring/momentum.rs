@@ -1,9 +1,8 @@
 //! Exact conservation of linear and angular momentum of unconstrained groups of pieces, independent of the accuracy
 //! of linear solves.
 
-use super::body::SoftBody;
-use super::contact::{ContactConstraint, ContactMode};
-use super::stage::{FrameContext, Stage, StageSolver};
+use super::contact::ContactMode;
+use super::stage::{Stage, StageSolver};
 use numerics::pieces::pieces;
 use numerics::rotation::CayleyRotation;
 use numerics::vector::{DMat3, DVec3};
@@ -24,7 +23,7 @@ struct ObstacleContact {
     contact: usize,
     /// Sum of its weights.
     weight: f64,
-    /// As in [`ContactConstraint::stiffness_directions`].
+    /// As in [`super::contact::ContactConstraint::stiffness_directions`].
     directions: ([DVec3; 3], usize),
 }
 
@@ -38,19 +37,18 @@ impl ObstacleContact {
 impl StageSolver {
     /// Finds the groups of pieces, joined by contacts with each other, that are not pinned; and which pieces have no
     /// contact.
-    pub(super) fn find_free_groups(&mut self, context: &FrameContext<'_>, contacts: &[ContactConstraint]) {
-        let pieces_in_all = context.body.order.pieces.len();
+    pub(super) fn find_free_groups(&mut self, stage: &Stage<'_>) {
+        let held = &stage.context.external.held;
+        let pieces_in_all = stage.context.body.order.pieces.len();
         let piece_of = |particle: usize| self.layout.piece_of(particle) as u32;
-        self.system.held.clone_from(&context.external.held);
+        self.system.held.clone_from(held);
         let (mut bound, mut touched) = (vec![false; pieces_in_all], vec![false; pieces_in_all]);
         let alone = &self.system.isolated;
-        for particle in (0..context.body.len())
-            .filter(|particle| context.external.held[*particle] || alone.get(*particle) == Some(&true))
-        {
+        for particle in (0..held.len()).filter(|particle| held[*particle] || alone.get(*particle) == Some(&true)) {
             bound[piece_of(particle) as usize] = true;
         }
         let mut links = Vec::new();
-        for contact in contacts {
+        for contact in stage.contacts {
             let first = piece_of(contact.particles[0] as usize);
             for (particle, _) in contact.sides() {
                 touched[piece_of(particle) as usize] = true;
@@ -67,9 +65,9 @@ impl StageSolver {
     }
 
     /// Total residual of each group.
-    pub(super) fn momentum_target(&self, body: &SoftBody, stage: &Stage<'_>) -> MomentumTarget {
+    pub(super) fn momentum_target(&self, stage: &Stage<'_>) -> MomentumTarget {
         let inertia = &self.system.inertia;
-        let sums = self.sums(body, |particle| (self.r[particle], inertia[particle]));
+        let sums = self.sums(stage, |particle| (self.r[particle], inertia[particle]));
         let (residual, mut stiffness): (Vec<DVec3>, Vec<DMat3>) =
             sums.into_iter().map(|(residual, inertia)| (residual, DMat3::identity() * inertia)).unzip();
         let obstacle_contacts = self.obstacle_contacts(stage);
@@ -98,7 +96,8 @@ impl StageSolver {
         obstacle_contacts.collect()
     }
 
-    fn sums(&self, body: &SoftBody, of: impl Fn(usize) -> (DVec3, f64) + Sync) -> Vec<(DVec3, f64)> {
+    fn sums(&self, stage: &Stage<'_>, of: impl Fn(usize) -> (DVec3, f64) + Sync) -> Vec<(DVec3, f64)> {
+        let body = stage.context.body;
         let clusters = &body.order.clusters;
         let add = |sum: (DVec3, f64), part: (DVec3, f64)| (sum.0 + part.0, sum.1 + part.1);
         let sums = clusters.map((), |cluster, ()| clusters.range(cluster).map(&of).fold((DVec3::zeros(), 0.0), add));
@@ -114,8 +113,9 @@ impl StageSolver {
 
     /// Translates each group as a whole so that `dx` accounts for its entire residual, and updates `r`. Springs and
     /// volumes are not affected.
-    pub(super) fn correct_linear_momentum(&mut self, body: &SoftBody, stage: &Stage<'_>, target: &MomentumTarget) {
-        let given = self.sums(body, |particle| (self.dx[particle] * self.system.inertia[particle], 0.0));
+    pub(super) fn correct_linear_momentum(&mut self, stage: &Stage<'_>, target: &MomentumTarget) {
+        let body = stage.context.body;
+        let given = self.sums(stage, |particle| (self.dx[particle] * self.system.inertia[particle], 0.0));
         let mut left: Vec<DVec3> =
             target.residual.iter().zip(&given).map(|(residual, (given, _))| residual - given).collect();
         for obstacle in &target.obstacle_contacts {
@@ -149,15 +149,10 @@ impl StageSolver {
     /// The positions `x`, with residual `r`, after each group was rotated as a whole so that it has the angular
     /// momentum that the stage's equation demands, which corrects the error of linear solves. Springs and volumes are
     /// not affected; the stiffness of contacts with obstacles is accounted for. `None` if there is nothing to rotate.
-    pub(super) fn corrected_angular_momentum(
-        &self,
-        body: &SoftBody,
-        stage: &Stage<'_>,
-        x: &[DVec3],
-    ) -> Option<Vec<DVec3>> {
+    pub(super) fn corrected_angular_momentum(&self, stage: &Stage<'_>, x: &[DVec3]) -> Option<Vec<DVec3>> {
         /// Moments of inertia below this fraction of the trace are treated as zero.
         const NEGLIGIBLE: f64 = 1e-9;
-        let inertia = &self.system.inertia;
+        let (body, inertia) = (stage.context.body, &self.system.inertia);
         let members = || {
             let grouped = body.order.pieces.iter().zip(&self.groups);
             let grouped = grouped.filter_map(|(piece, group)| Some(((*group)? as usize, piece)));

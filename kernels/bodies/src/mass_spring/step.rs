@@ -17,7 +17,6 @@ use super::energy::{Energies, measure};
 use super::frame::{FrameReport, Integrator, SolverFrame};
 use super::predictor::RigidMotion;
 use super::stage::{FrameContext, Solved, StageSolver};
-use super::state::CachedCoarseFactor;
 use super::volume::Inventory;
 use numerics::vector::DVec3;
 
@@ -69,7 +68,6 @@ pub(super) struct Stepper<'a> {
     pub(super) seconds: f64,
     /// Error of positions in a frame that [`Integrator::Accurate`] allows, metres.
     pub(super) tolerance: Option<f64>,
-    pub(super) cached: &'a mut CachedCoarseFactor,
     /// Number of steps still to be taken with implicit Euler.
     pub(super) euler_steps_left: &'a mut u32,
     /// Energy that steps have dissipated so far, and that rounding in later ones may return, joules.

@@ -7,7 +7,6 @@
 
 use super::body::SoftBody;
 use super::springs::Record;
-use numerics::partition::Partition;
 use numerics::rank_one::RankOneTerms;
 use numerics::vector::DVec3;
 
@@ -37,7 +36,8 @@ pub(super) struct System {
 
 impl System {
     /// Writes A·p to `out` and returns pᵀAp. `p` is 0 at pinned particles.
-    pub(super) fn apply(&mut self, body: &SoftBody, clusters: &Partition, p: &[DVec3], out: &mut [DVec3]) -> f64 {
+    pub(super) fn apply(&mut self, body: &SoftBody, p: &[DVec3], out: &mut [DVec3]) -> f64 {
+        let clusters = &body.order.clusters;
         self.regions.measure(p);
         self.transient.measure(p);
         let system = &*self;

@@ -4,7 +4,7 @@
 use super::contact::ContactConstraint;
 use super::predictor::Predictor;
 use super::springs::{distance, drift};
-use super::stage::{Newton, Solved, Stage, StageSolver};
+use super::stage::{FrameContext, Newton, Solved, Stage, StageSolver};
 use super::step::{Kinematics, Stepper, sum};
 use numerics::vector::DVec3;
 
@@ -18,6 +18,7 @@ const NEWTON_SHARE: f64 = 0.1;
 
 /// What both stages of a step share.
 struct Step<'a> {
+    context: FrameContext<'a>,
     start: &'a Kinematics,
     contacts: &'a [ContactConstraint],
     predictor: Predictor<'a>,
@@ -43,9 +44,10 @@ struct StageEnd {
 
 impl<'a> Step<'a> {
     /// The equation of one of the stages.
-    fn stage<'b>(&'b self, y: &'b [DVec3], z: &'b [DVec3], time: f64, early: f64, index: usize) -> Stage<'b> {
-        let (a, contacts, rotational_energy) = (self.a, self.contacts, &self.rotational_energy[..]);
-        Stage { y, z, a, time, contacts, early, rotational_energy, index, ..Stage::default() }
+    fn stage<'b>(&'b self, [y, z]: [&'b [DVec3]; 2], time: f64, early: f64, index: usize) -> Stage<'b> {
+        let (contacts, rotational_energy, line_search) = (self.contacts, &self.rotational_energy[..], false);
+        let stage = Stage::new(self.context, [y, z], self.a, time);
+        Stage { contacts, early, rotational_energy, index, line_search, ..stage }
     }
 }
 
@@ -63,6 +65,7 @@ impl Stepper<'_> {
         let start = motion.clone();
         let predictor = Predictor::new(body, &self.loose(), &start.x, &start.v, &start.acceleration, h);
         let step = Step {
+            context: self.context,
             start: &start,
             contacts,
             rotational_energy: predictor.rotational_energy(),
@@ -83,7 +86,7 @@ impl Stepper<'_> {
         let end = self.backward_difference_stage(&step, &middle);
         let mut solved = sum(middle.solved, end.solved);
         let error = self.unfiltered_error(&step, &middle, &end);
-        let (error, iterations) = self.solver.filter(body, self.cached, self.tolerance.is_some(), error);
+        let (error, iterations) = self.solver.filter(body, self.tolerance.is_some(), error);
         solved.cg += iterations;
         (motion.x, motion.v) = (end.x, end.v);
         (solved, Some(error))
@@ -105,15 +108,15 @@ impl Stepper<'_> {
             solver.set_step_start(&self.context, a, length, volumes);
         };
         extrapolate(self.solver, -a);
-        let force = self.solver.forces(&self.context, &step.stage(&[], &[], times[0], h, 0), &start.x, &start.v);
+        let force = self.solver.forces(&step.stage([&[], &[]], times[0], h, 0), &start.x, &start.v);
         extrapolate(self.solver, a);
         let mut z: Vec<DVec3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * a).collect();
         let y: Vec<DVec3> = (0..x.len())
             .map(|particle| z[particle] + start.v[particle] * a + force[particle] * (a * a / body.mass[particle]))
             .collect();
         self.pin(&mut x, &mut z, time, a);
-        let stage = step.stage(&y, &z, time, (1.0 - GAMMA) * h, 0);
-        let solved = self.solver.solve(&self.context, &stage, step.newton, self.cached, &mut x);
+        let stage = step.stage([&y, &z], time, (1.0 - GAMMA) * h, 0);
+        let solved = self.solver.solve(&stage, step.newton, &mut x);
         let v = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
         StageEnd { x, v, solved }
     }
@@ -138,8 +141,8 @@ impl Stepper<'_> {
         let y: Vec<DVec3> = z.iter().zip(&z_rate).map(|(z, rate)| z + rate * a).collect();
         let mut x = step.predictor.past(step.h, GAMMA, &middle.x);
         self.pin(&mut x, &mut z, times[1], a);
-        let stage = step.stage(&y, &z, times[1], 0.0, 1);
-        let solved = self.solver.solve(&self.context, &stage, step.newton, self.cached, &mut x);
+        let stage = step.stage([&y, &z], times[1], 0.0, 1);
+        let solved = self.solver.solve(&stage, step.newton, &mut x);
         let v = x.iter().zip(&z).map(|(x, z)| (x - z) / a).collect();
         StageEnd { x, v, solved }
     }

@@ -8,7 +8,7 @@
 
 use super::body::{SoftBody, volume};
 use numerics::partition::{Partition, RaggedSlice};
-use numerics::vector::DVec3;
+use numerics::vector::{DVec2, DVec3};
 
 /// Bulk modulus of the springs ÷ E: their Poisson ratio is a quarter.
 const SPRINGS: f64 = 2.0 / 3.0;
@@ -169,8 +169,8 @@ impl Volumes {
         let (regions, stiffness, rest, before, a) = (&body.regions, &self.stiffness, &self.rest, &self.before, self.a);
         let gradients = RaggedSlice::new(&regions.starts, &mut self.gradients);
         let out = (&mut self.pressures[..], &mut self.slopes[..], &mut self.changes[..], gradients);
-        let sums = partition.map(out, |part, (pressures, slopes, changes, mut gradients)| {
-            let (mut stored, mut damped) = (0.0, 0.0);
+        let sums = partition.sum(out, |part, (pressures, slopes, changes, mut gradients)| {
+            let mut sums = DVec2::zeros();
             let regions_here = partition.range(part).zip(pressures).zip(slopes).zip(changes).zip(gradients.iter_mut());
             for ((((region, pressure), slope), change), mine) in regions_here {
                 let volume = regions.measure(region, x, mine);
@@ -181,12 +181,11 @@ impl Volumes {
                 *change = [volume - rest[region], dashed];
                 *pressure = k * push + dashed * more;
                 *slope = k * steep + dashed;
-                stored += k * energy;
-                damped += 0.5 * dashed * more * more;
+                sums += DVec2::new(k * energy, 0.5 * dashed * more * more);
             }
-            (stored, damped)
+            sums
         });
-        (self.stored, self.damped) = sums.into_iter().fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1));
+        (self.stored, self.damped) = (sums.x, sums.y);
     }
 
     /// Energy that the regions' dashpots take in a step of `h` seconds at the rate last measured, joules.
