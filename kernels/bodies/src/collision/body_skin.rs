@@ -71,7 +71,8 @@ impl BodySkin {
                 let surface = TriangleSurface::new(rest.len(), triangles);
                 let turn =
                     surface.closed && triangles[0][0] as usize >= particles && signed_volume(triangles, rest) < 0.0;
-                if turn { TriangleSurface::new(rest.len(), &turned(triangles)) } else { surface }
+                let turned = || triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect::<Vec<_>>();
+                if turn { TriangleSurface::new(rest.len(), &turned()) } else { surface }
             })
             .collect();
         let edges = surfaces.iter().flat_map(|surface| &surface.edges).map(|edge| edge.ends);
@@ -195,25 +196,16 @@ impl BodySkin {
 #[derive(Clone, Debug, Default)]
 pub(super) struct ReleasedElements {
     /// Whether each edge is released; empty if none is.
-    edges: Vec<bool>,
+    pub(super) edges: Vec<bool>,
     /// Whether each triangle has a released edge.
-    faces: Vec<bool>,
+    pub(super) faces: Vec<bool>,
     /// Whether all edges of a surface particle are released.
-    particles: Vec<bool>,
+    pub(super) particles: Vec<bool>,
 }
 
-impl ReleasedElements {
-    pub(super) fn has_edge(&self, edge: u32) -> bool {
-        self.edges.get(edge as usize) == Some(&true)
-    }
-
-    pub(super) fn has_face(&self, face: u32) -> bool {
-        self.faces.get(face as usize) == Some(&true)
-    }
-
-    pub(super) fn has_particle(&self, particle: u32) -> bool {
-        self.particles.get(particle as usize) == Some(&true)
-    }
+/// Whether an element is released, according to a list that is empty if none is.
+pub(super) fn has(released: &[bool], element: u32) -> bool {
+    released.get(element as usize) == Some(&true)
 }
 
 fn edge_length(edge: &Edge, places: &[[f64; 3]]) -> f64 {
@@ -251,11 +243,6 @@ fn signed_volume(triangles: &[[u32; 3]], places: &[[f64; 3]]) -> f64 {
     let origin = DVec3::from(places[triangles[0][0] as usize]);
     let corners = |face: &[u32; 3]| face.map(|corner| DVec3::from(places[corner as usize]) - origin);
     triangles.iter().map(corners).map(|[a, b, c]| a.dot(&b.cross(&c))).sum()
-}
-
-/// Triangles that face the other way.
-fn turned(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
-    triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect()
 }
 
 /// The points of each surface and the particles within, ascending: a walk from all surfaces at once gives each particle

@@ -25,7 +25,7 @@ mod vertex;
 
 use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
 pub use body_skin::BodySkin;
-use body_skin::ReleasedElements;
+use body_skin::{ReleasedElements, has};
 pub use caught::CaughtParticle;
 pub use motion::ObstaclePose;
 use numerics::closest_point::ClosestPoint;
@@ -301,7 +301,7 @@ impl SkinObstaclePair<'_> {
         let solid = self.solid_at_start(&bounds);
         let find_in = |(): &mut (), particles: &[u32], out: &mut Vec<Contact>| {
             let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
-            for particle in particles.iter().filter(|particle| !self.released.has_particle(**particle)) {
+            for particle in particles.iter().filter(|particle| !has(&self.released.particles, **particle)) {
                 tree.overlapping(&self.boxes[0][*particle as usize], &mut faces);
                 let own = &self.boxes[0][*particle as usize];
                 let entry = self.entry(*particle);
@@ -327,7 +327,7 @@ impl SkinObstaclePair<'_> {
     /// its `bounds`.
     fn solid_at_start(&self, bounds: &Cuboid) -> Option<TriangleTree> {
         let may_be_inside = |particle: &u32| {
-            !self.released.has_particle(*particle) && swept::overlap(&self.boxes[0][*particle as usize], bounds)
+            !has(&self.released.particles, *particle) && swept::overlap(&self.boxes[0][*particle as usize], bounds)
         };
         if !self.obstacle.surface.closed || !self.skin.touching.iter().any(may_be_inside) {
             return None;
@@ -354,7 +354,7 @@ impl SkinObstaclePair<'_> {
             for point in points {
                 let region = swept::inflated(&self.boxes[1][*point as usize], self.rules.reach);
                 tree.overlapping(&region, &mut faces);
-                faces.retain(|face| !self.released.has_face(*face));
+                faces.retain(|face| !has(&self.released.faces, *face));
                 if faces.is_empty() {
                     continue;
                 }
@@ -378,7 +378,7 @@ impl SkinObstaclePair<'_> {
         let indices: Vec<u32> = (0..self.skin.surface.edges.len() as u32).collect();
         let find_in = |(): &mut (), edges: &[u32], out: &mut Vec<Contact>| {
             let mut others = Vec::new();
-            for index in edges.iter().filter(|edge| !self.released.has_edge(**edge)) {
+            for index in edges.iter().filter(|edge| !has(&self.released.edges, **edge)) {
                 let edge = &self.skin.surface.edges[*index as usize];
                 tree.overlapping(&swept::bounds_of(&edge.ends, self.boxes[0]), &mut others);
                 for other in &others {
@@ -403,17 +403,15 @@ impl SkinObstaclePair<'_> {
         shift: f64,
     ) -> Contact {
         let (gap, times) = (self.rules.gap, self.query.times);
-        let [(_, raised), (end, raised_end)] = [self.still.start(), self.still.end()].map(|at| {
-            let touched = points.iter().zip(shares).map(|(point, share)| at.position(*point) * *share).sum();
-            (touched, self.scene.raised(touched, normal, gap))
-        });
+        let touched = [self.still.start(), self.still.end()].map(|at| at.weighted(points, shares));
+        let [raised, raised_end] = touched.map(|touched| self.scene.raised(touched, normal, gap));
         let seconds = self.obstacle.seconds * (times[1] - times[0]);
         let stopping = if seconds > 0.0 { (raised_end - raised) / seconds } else { DVec3::zeros() };
         Contact {
             points: own,
             weights,
             normal: normal.into(),
-            offset: normal.dot(&(end + raised_end)) - shift,
+            offset: normal.dot(&(touched[1] + raised_end)) - shift,
             gap,
             velocity: (self.obstacle.velocity_of(times[1], points, shares) + stopping).into(),
             friction: self.obstacle.friction * self.scene.friction_scale(&own, &weights),

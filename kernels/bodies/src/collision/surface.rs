@@ -59,6 +59,11 @@ impl<'a> Moment<'a> {
         let to = DVec3::from(self.to[point as usize]);
         if self.share >= 1.0 { to } else { DVec3::from(self.from[point as usize]).lerp(&to, self.share) }
     }
+
+    /// The sum of the positions of points times their weights.
+    pub(super) fn weighted(&self, points: &[u32], weights: &[f64]) -> DVec3 {
+        points.iter().zip(weights).map(|(point, weight)| self.position(*point) * *weight).sum()
+    }
 }
 
 impl TriangleSurface {
