@@ -1,6 +1,6 @@
 //! Forces, residual and linear system of a stage at given positions.
 
-use super::contact::ContactMode;
+use super::contact::{ContactMode, ContactState};
 use super::springs::{self, Sums};
 use super::stage::{FrameContext, Stage, StageSolver};
 use super::system::{smoother, solve_lower};
@@ -28,8 +28,10 @@ impl StageSolver {
             self.volumes.measure(body, x);
         }
         self.thin_tets = self.volumes.thin_tets(body, x, volumes, &self.inventory.watched);
-        self.contact_states.clear();
-        self.contact_states.extend(stage.contacts.iter().map(|contact| contact.at(x, v, stage.early, body.size)));
+        self.contact_states.resize(stage.contacts.len(), ContactState::default());
+        for (contact, state) in stage.contacts.iter().zip(&mut self.contact_states) {
+            contact.update(state, [x, v], stage.early, body.size);
+        }
         self.transient_forces.clear();
         if !self.thin_tets.is_empty() || !self.contact_states.is_empty() {
             self.transient_forces.resize(x.len(), DVec3::zeros());
@@ -151,21 +153,21 @@ impl StageSolver {
             along.extend(thin.gradient.iter().map(|g| g * root));
             starts.push(particles.len() as u32);
         }
-        let known = || stage.contacts.iter().zip(&self.contact_states).zip(&self.friction_duals);
+        let known = || stage.contacts.iter().zip(&self.contact_states);
         let grouped = [false, true].into_iter().flat_map(|two_sided| known().map(move |known| (two_sided, known)));
-        for (two_sided, ((contact, state), dual)) in grouped {
+        for (two_sided, (contact, state)) in grouped {
             if state.mode == ContactMode::Open || contact.is_two_sided() != two_sided {
                 continue;
             }
-            let (directions, count) = contact.stiffness_directions(state, a, dual);
+            let directions = contact.stiffness_directions(state, a);
             let mut sides = contact.sides();
             if let (Some((particle, weight)), None) = (sides.next(), sides.next()) {
                 self.system.blocks.resize(body.len(), [0.0; 6]);
                 let block = &mut self.system.blocks[particle];
-                directions[..count].iter().for_each(|direction| add_square(block, *direction, weight * weight));
+                directions.for_each(|direction| add_square(block, direction, weight * weight));
                 continue;
             }
-            for direction in &directions[..count] {
+            for direction in directions {
                 for (particle, weight) in contact.sides() {
                     particles.push(particle as u32);
                     along.push(direction * weight);

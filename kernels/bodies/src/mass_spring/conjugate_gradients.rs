@@ -5,11 +5,12 @@
 //! Sums run by cluster in a fixed order, so bits do not depend on the number of threads.
 
 use super::body::SoftBody;
-use super::coarse::moved;
+use super::coarse::{ClusterMotions, MODES};
 use super::state::CachedCoarseFactor;
 use super::system::{System, solve_lower, solve_lower_transpose};
+use numerics::cholesky::EnvelopeMatrix;
 use numerics::simd::Path;
-use numerics::vector::{DVec3, Vec3, to_f64};
+use numerics::vector::{DVec3, Vec3};
 
 /// An absolute bound on the residual is not pursued below this fraction of the initial residual.
 const FINEST: f64 = 1e-4;
@@ -39,58 +40,37 @@ pub(super) struct Reached {
 #[derive(Clone, Copy)]
 pub(super) struct Coarse<'a> {
     body: &'a SoftBody,
-    cached: &'a CachedCoarseFactor,
-    offset_from_centroid: &'a [Vec3],
+    factor: &'a EnvelopeMatrix,
+    motions: ClusterMotions<'a>,
 }
 
 impl<'a> Coarse<'a> {
     pub(super) fn new(body: &'a SoftBody, cached: &'a CachedCoarseFactor, offset_from_centroid: &'a [Vec3]) -> Self {
-        Self { body, cached, offset_from_centroid }
+        let motions = ClusterMotions { offset_from_centroid, filters: &cached.filters };
+        Self { body, factor: &cached.factor, motions }
     }
 
     /// The squared residual in the preconditioner's norm, from the squares and the forces of all clusters; sets the rigid
     /// motions `modes` of the clusters under these forces.
-    fn squared_norm(&self, of_clusters: Vec<(f64, [f64; 6])>, modes: &mut Vec<f64>) -> f64 {
-        let (squares, forces): (Vec<f64>, Vec<[f64; 6]>) = of_clusters.into_iter().unzip();
+    fn squared_norm(&self, of_clusters: Vec<(f64, [f64; MODES])>, modes: &mut Vec<f64>) -> f64 {
+        let (squares, forces): (Vec<f64>, Vec<[f64; MODES]>) = of_clusters.into_iter().unzip();
         modes.clear();
-        if !self.cached.factor.is_empty() {
+        if !self.factor.is_empty() {
             modes.extend(forces.iter().flatten());
-            self.cached.factor.solve(Path::chosen(), modes);
+            self.factor.solve(Path::chosen(), modes);
         }
         let work = forces.iter().flatten().zip(modes).fold(0.0, |sum, (force, mode)| sum + force * *mode);
         squares.iter().sum::<f64>() + work
     }
 
-    /// Displacement of a particle by the rigid motion of its cluster.
-    #[inline(always)]
-    fn moved(&self, modes: &[f64], cluster: usize, particle: usize) -> DVec3 {
-        if modes.is_empty() {
-            DVec3::zeros()
-        } else {
-            let free = moved(&modes[6 * cluster..6 * cluster + 6], to_f64(self.offset_from_centroid[particle]));
-            self.cached.filters.at(particle).map_or(free, |filter| filter * free)
-        }
-    }
-
-    /// Adds a particle's contribution to the force and torque on its cluster to `sums`.
-    #[inline(always)]
-    fn restrict(&self, particle: usize, r: DVec3, sums: &mut [f64; 6]) {
-        let r = self.cached.filters.at(particle).map_or(r, |filter| filter.tr_mul(&r));
-        let torque = to_f64(self.offset_from_centroid[particle]).cross(&r);
-        for axis in 0..3 {
-            sums[axis] += r[axis];
-            sums[3 + axis] += torque[axis];
-        }
-    }
-
     /// The squared residual of a cluster in the norm of the fine level, and the force and torque on it; `r` are those of its
     /// particles.
     #[inline(always)]
-    fn of_cluster(&self, system: &System, cluster: usize, r: &[DVec3]) -> (f64, [f64; 6]) {
-        let (mut square, mut sums) = (0.0, [0.0; 6]);
+    fn of_cluster(&self, system: &System, cluster: usize, r: &[DVec3]) -> (f64, [f64; MODES]) {
+        let (mut square, mut sums) = (0.0, [0.0; MODES]);
         for (particle, r) in self.body.order.clusters.range(cluster).zip(r) {
             square += solve_lower(&system.smoother[particle], *r).norm_squared();
-            self.restrict(particle, *r, &mut sums);
+            sums.iter_mut().zip(self.motions.along(particle, *r)).for_each(|(sum, force)| *sum += force);
         }
         (square, sums)
     }
@@ -148,12 +128,14 @@ impl<'a> Coarse<'a> {
     /// Sets the search direction `p` to the preconditioned residual plus `beta` times the last direction.
     fn update_direction(&self, system: &System, modes: &[f64], r: &[DVec3], beta: f64, p: &mut [DVec3]) {
         self.body.order.clusters.for_each(p, |cluster, mine: &mut [DVec3]| {
+            let own = modes.get(MODES * cluster..MODES * (cluster + 1));
             for (particle, p) in
                 self.body.order.clusters.range(cluster).zip(mine).filter(|(particle, _)| !system.held[*particle])
             {
                 let smoother = &system.smoother[particle];
                 let fine = solve_lower_transpose(smoother, solve_lower(smoother, r[particle]));
-                *p = fine + self.moved(modes, cluster, particle) + *p * beta;
+                let coarse = own.map_or(DVec3::zeros(), |modes| self.motions.moved(modes, particle));
+                *p = fine + coarse + *p * beta;
             }
         });
     }

@@ -2,7 +2,6 @@
 
 use super::springs;
 use super::stage::{FrameContext, StageSolver};
-use super::step::Kinematics;
 use numerics::vector::{DVec2, DVec3};
 
 /// Energies, joules.
@@ -38,16 +37,14 @@ pub(super) fn measure(
     solver: &mut StageSolver,
     context: &FrameContext<'_>,
     time: f64,
-    motion: &Kinematics,
+    [x, v]: [&[DVec3]; 2],
     looked: bool,
 ) -> Energies {
-    let (body, x, v) = (context.body, &motion.x, &motion.v);
+    let body = context.body;
     if !looked {
         solver.volumes.measure(body, x);
     }
-    let watched = &solver.inventory.watched;
-    let thin: f64 = solver.volumes.thin_tets(body, x, context.volumes, watched).iter().map(|thin| thin.energy).sum();
-    let stored = solver.volumes.stored;
+    let [stored, thin] = solver.volumes.energy(context, x, &solver.inventory.watched);
     let (rest, before, now) = (&context.rest, &solver.lengths, &mut solver.lengths_now);
     now.resize(body.ends.len(), 0.0);
     let springs = body.spring_partition.sum(&mut now[..], |part, now: &mut [f64]| {

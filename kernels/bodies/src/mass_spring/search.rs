@@ -8,6 +8,8 @@ use super::springs;
 use super::stage::{CG_SHARE, CG_SHARE_PRECISE, FrameContext, Solved, Stage, StageSolver};
 use numerics::vector::{DVec2, DVec3};
 
+/// Final ÷ initial residual.
+const SHARE: f64 = 0.05;
 /// Tolerance of linear solves with contacts, relative to the residual: more Newton iterations follow anyway. With 0.2 those
 /// of stiff bodies that hit a surface do not find their loads of friction.
 const CG_SHARE_LINE_SEARCH: f64 = 0.17;
@@ -27,19 +29,6 @@ const THINNING: f64 = 0.1;
 /// Fraction of the objective that is rounding: smaller decreases are not searched for.
 const ROUNDING: f64 = 1e-12;
 
-/// Stopping criteria of a descent.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct StopCriteria {
-    /// Final ÷ initial residual.
-    pub(super) share: f64,
-    /// Upper bound on the squared initial residual, so that a poor initial guess does not loosen the tolerance.
-    pub(super) scale: f64,
-    /// A squared residual that suffices in any case.
-    pub(super) square: f64,
-    /// Squared residual at the start of the step; 0 if this descent starts it.
-    pub(super) first: f64,
-}
-
 /// The objective, in two parts.
 #[derive(Clone, Copy, Debug, Default)]
 struct ObjectiveParts {
@@ -55,25 +44,17 @@ impl ObjectiveParts {
     }
 }
 
-/// Outcome of a line search.
-struct LineSearch {
-    /// Fraction of the direction taken; 0 if none lowers the objective.
-    share: f64,
-    /// Objective at the end.
-    lower: ObjectiveParts,
-    /// Whether particles were stopped at contacts.
-    stopped: bool,
-}
-
 impl StageSolver {
     /// Solves the stage from the initial guess `x` by Newton's method with line search, until the residual is small, no
     /// contact is too deep, and the loads of friction are the normal forces of bodies in balance. Updates the loads of
-    /// `contacts` on the way.
+    /// `contacts` on the way. `scale` bounds the squared initial residual, so that a poor initial guess does not loosen the
+    /// tolerance; what sufficed in descents of the step `before` suffices again.
     pub(super) fn descend(
         &mut self,
         stage: &Stage<'_>,
         contacts: &mut [ContactConstraint],
-        enough: StopCriteria,
+        scale: f64,
+        before: &Solved,
         x: &mut [DVec3],
     ) -> Solved {
         let context = &stage.context;
@@ -93,10 +74,10 @@ impl StageSolver {
             self.assemble(stage, x, true);
             let now = self.square(stage);
             if solved.newton == 0 {
-                solved.first = if enough.first > 0.0 { enough.first } else { now };
+                solved.first = if before.first > 0.0 { before.first } else { now };
                 let contacts = self.contact_objective(stage, x);
                 base = ObjectiveParts { contacts, others: self.other_objective(stage, x) };
-                solved.enough = enough.square.max(enough.share * enough.share * now.min(enough.scale));
+                solved.enough = before.enough.max(SHARE * SHARE * now.min(scale));
             }
             solved.set_residual(now);
             let deep = contacts.iter().any(|contact| contact.is_too_deep(x));
@@ -133,7 +114,7 @@ impl StageSolver {
                 break;
             }
             self.volumes.predict(context.body, &self.dx);
-            let LineSearch { share, lower, stopped } = self.search(stage, x, base);
+            let (share, lower, stopped) = self.search(stage, x, base);
             self.follow(stage, share, x);
             self.measured = share > 0.0;
             let all = share > LONG && !stopped;
@@ -178,11 +159,9 @@ impl StageSolver {
     /// The objective ½(x − y)ᵀM(x − y) + a²·(potentials) without contacts, at positions for which
     /// [`Self::contact_objective`] was just evaluated.
     fn other_objective(&mut self, stage: &Stage<'_>, x: &[DVec3]) -> f64 {
-        let (FrameContext { body, external, volumes, .. }, a) = (stage.context, stage.a);
+        let (FrameContext { body, external, .. }, a) = (stage.context, stage.a);
         self.volumes.measure(body, x);
-        let stored = self.volumes.stored + self.volumes.damped;
-        let watched = &self.inventory.watched;
-        let thin: f64 = self.volumes.thin_tets(body, x, volumes, watched).iter().map(|thin| thin.energy).sum();
+        let [stored, thin] = self.volumes.energy(&stage.context, x, &self.inventory.watched);
         let (v, links) = (&self.v, &self.links);
         let clusters = &body.order.clusters;
         let sums = clusters.sum((), |cluster, ()| {
@@ -198,7 +177,7 @@ impl StageSolver {
             })
         });
         let (own, inertial) = (sums.x, sums.y);
-        inertial + a * a * (stored + thin + own)
+        inertial + a * a * (stored + self.volumes.damped + thin + own)
     }
 
     /// Contribution of contacts to the objective at `x`; sets the velocities to those at `x`.
@@ -223,14 +202,15 @@ impl StageSolver {
     }
 
     /// Tries 1, ½, ¼ … of `dx` until the objective falls below `base`, each both unchanged and limited by [`stop`].
-    /// `dx` becomes the direction actually taken.
+    /// `dx` becomes the direction actually taken. Returns the fraction of it, 0 if none lowers the objective, the objective at
+    /// the end, and whether particles were stopped at contacts.
     ///
     /// The contact part is evaluated first: a trial is rejected without evaluating the rest if contacts gain more
     /// than the rest can lose along its initial slope. Moving too far into a contact is the usual reason for a
     /// rejection.
-    fn search(&mut self, stage: &Stage<'_>, x: &[DVec3], base: ObjectiveParts) -> LineSearch {
+    fn search(&mut self, stage: &Stage<'_>, x: &[DVec3], base: ObjectiveParts) -> (f64, ObjectiveParts, bool) {
         let mut trial = std::mem::take(&mut self.trial);
-        let mut found = LineSearch { share: 0.0, lower: base, stopped: false };
+        let mut found = (0.0, base, false);
         let most = base.sum() + ROUNDING * base.sum().abs();
         let clusters = &stage.context.body.order.clusters;
         let shares = std::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(HALVINGS);
@@ -252,7 +232,7 @@ impl StageSolver {
                 if stopped {
                     self.dx.iter_mut().zip(&trial).zip(x).for_each(|((d, trial), x)| *d = (trial - x) / share);
                 }
-                found = LineSearch { share, lower, stopped };
+                found = (share, lower, stopped);
                 break;
             }
         }

@@ -6,7 +6,7 @@
 //! converge.
 
 use super::body::SoftBody;
-use super::coarse::{self, ContactFilters, Layout};
+use super::coarse::{self, ClusterMotions, ContactFilters, Layout};
 use super::conjugate_gradients::{Coarse, Limits, Reached};
 use super::contact::{ContactConstraint, ContactState};
 use super::external::ExternalForces;
@@ -158,15 +158,8 @@ pub(super) struct StageSolver {
     pub(super) trial: Vec<DVec3>,
     pub(super) thin_tets: Vec<ThinTet>,
     pub(super) contact_states: Vec<ContactState>,
-    /// Friction dual of each contact: predicted friction relative to its bound.
-    pub(super) friction_duals: Vec<DVec3>,
-    /// Predicted normal force of each contact, newtons, and pressure of thin tetrahedra, Pa, in ascending order; `None` before
-    /// the first linear system.
-    pub(super) predicted_loads: Vec<f64>,
+    /// Predicted pressure of thin tetrahedra, Pa, in ascending order; `None` before the first linear system.
     pub(super) predicted_pressures: Option<Vec<(u32, f64)>>,
-    /// Contacts and thin tetrahedra that were linearised around another force than the current one, and the difference.
-    pub(super) contact_offsets: Vec<(usize, f64)>,
-    pub(super) thin_offsets: Vec<(usize, f64)>,
     /// Forces of contacts and thin tetrahedra; may be empty: none.
     pub(super) transient_forces: Vec<DVec3>,
     /// For each piece the free group it belongs to: pieces joined by contacts of which none is pinned. And which
@@ -182,6 +175,7 @@ impl StageSolver {
             records: vec![Record::default(); body.adjacency.incident.len()],
             inertia: vec![0.0; count],
             held: vec![false; count],
+            isolated: vec![false; count],
             smoother: vec![[0.0; 6]; count],
             ..System::default()
         };
@@ -200,36 +194,22 @@ impl StageSolver {
         volumes: Vec<f64>,
     ) {
         springs::links(context.body, &context.rest, a, before, &mut self.links);
-        self.volumes.begin(a, volumes);
+        (self.volumes.a, self.volumes.before) = (a, volumes);
         self.measured = false;
     }
 
     /// Prepares a solve.
     pub(super) fn begin(&mut self, stage: &Stage<'_>) {
         self.find_free_groups(stage);
-        self.friction_duals.clear();
-        self.friction_duals.resize(stage.contacts.len(), DVec3::zeros());
         self.forget_pressures();
-        self.predicted_loads.clear();
-        self.predicted_loads.extend(stage.contacts.iter().map(|contact| contact.load));
+        self.contact_states.clear();
+        self.contact_states.extend(stage.contacts.iter().map(ContactConstraint::unsolved));
     }
 
     /// Solves the stage from the initial guess `x`, whose pinned particles are already in place, by Newton's method
     /// without line search; then corrects the angular momentum of free groups.
     pub(super) fn solve(&mut self, stage: &Stage<'_>, newton: Newton, x: &mut [DVec3]) -> Solved {
         self.begin(stage);
-        let mut solved = self.iterate(stage, newton, x);
-        if let Some(corrected) = self.corrected_angular_momentum(stage, x) {
-            x.copy_from_slice(&corrected);
-            self.assemble(stage, x, false);
-            if !solved.failed {
-                solved.set_residual(self.square(stage));
-            }
-        }
-        solved
-    }
-
-    fn iterate(&mut self, stage: &Stage<'_>, newton: Newton, x: &mut [DVec3]) -> Solved {
         let mut solved = Solved::default();
         loop {
             self.assemble(stage, x, true);
@@ -239,7 +219,7 @@ impl StageSolver {
             }
             let asked = if stage.contacts.is_empty() { CG_SHARE } else { CG_SHARE_PRECISE };
             if !self.direction(stage, asked, x, &mut solved) {
-                return solved;
+                break;
             }
             let predicted = std::mem::take(&mut self.r);
             self.follow(stage, 1.0, x);
@@ -256,9 +236,17 @@ impl StageSolver {
                 self.squared_norm(clusters, deviation) > NONLINEAR * NONLINEAR * before
             };
             if solved.failed || !wanted || solved.newton >= newton.most || (stage.context.cancelled)() {
-                return solved;
+                break;
             }
         }
+        if let Some(corrected) = self.corrected_angular_momentum(stage, x) {
+            x.copy_from_slice(&corrected);
+            self.assemble(stage, x, false);
+            if !solved.failed {
+                solved.set_residual(self.square(stage));
+            }
+        }
+        solved
     }
 
     /// The largest component of the direction `dx`, metres.
@@ -268,15 +256,8 @@ impl StageSolver {
 
     /// Applies a fraction `share` of `dx` and updates the predictions of forces.
     pub(super) fn follow(&mut self, stage: &Stage<'_>, share: f64, x: &mut [DVec3]) {
-        let known = stage
-            .contacts
-            .iter()
-            .zip(&self.contact_states)
-            .zip(&mut self.friction_duals)
-            .zip(&mut self.predicted_loads);
-        for (((contact, state), dual), push) in known {
-            *dual = contact.next_dual(state, dual, &self.dx, share, stage.a);
-            *push = contact.predicted_force(state, &self.dx, share);
+        for (contact, state) in stage.contacts.iter().zip(&mut self.contact_states) {
+            contact.predict(state, &self.dx, share, stage.a);
         }
         self.volumes.shorten_predicted(share);
         let pressures = self.thin_tets.iter().map(|thin| (thin.tet, thin.predicted(&self.dx, share)));
@@ -373,8 +354,8 @@ impl StageSolver {
     }
 
     fn renew(&mut self, body: &SoftBody, filters: ContactFilters) {
-        let (layout, system, offset_from_centroid) = (&self.layout, &self.system, &self.offset_from_centroid);
-        let factor = Galerkin { layout, body, system, offset_from_centroid, filters: &filters }.factor();
+        let motions = ClusterMotions { offset_from_centroid: &self.offset_from_centroid, filters: &filters };
+        let factor = Galerkin { layout: &self.layout, body, system: &self.system, motions }.factor();
         self.cached = CachedCoarseFactor { factor, filters, ..CachedCoarseFactor::default() };
     }
 }
@@ -382,7 +363,7 @@ impl StageSolver {
 #[cfg(test)]
 mod tests {
     use super::super::body::{Material, Mesh};
-    use super::super::search::StopCriteria;
+    use super::super::frame::SolverFrame;
     use super::*;
     use crate::tets::cubes;
 
@@ -394,7 +375,8 @@ mod tests {
         let material = Material { density: 1000.0.into(), stiffness: 1e4.into(), damping: 0.01.into() };
         let mesh = Mesh { points: &points, tets: &tets, ..Mesh::default() };
         let body = SoftBody::new(&mesh, &material, &[]).unwrap();
-        let external = ExternalForces::new(&body, DVec3::zeros(), 0.0, h, &[], &[]);
+        let frame = SolverFrame { gravity: [0.0; 3], ..SolverFrame::default() };
+        let external = ExternalForces::new(&body, &frame, h);
         let rest = RestLengths { lengths: &body.lengths, torn: &[] };
         let context =
             FrameContext { body: &body, external: &external, rest, volumes: &body.volumes, cancelled: &|| false };
@@ -409,8 +391,7 @@ mod tests {
             let stage = Stage { line_search, ..Stage::new(context, [&inertial, &start], h, 1.0) };
             let mut x = inertial.clone();
             let solved = if line_search {
-                let enough = StopCriteria { share: 0.05, scale: f64::INFINITY, square: 0.0, first: 0.0 };
-                solver.descend(&stage, &mut [], enough, &mut x)
+                solver.descend(&stage, &mut [], f64::INFINITY, &Solved::default(), &mut x)
             } else {
                 solver.solve(&stage, Newton { most: 1, tolerance: 0.0 }, &mut x)
             };

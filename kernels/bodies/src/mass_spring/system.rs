@@ -22,7 +22,7 @@ pub(super) struct System {
     pub(super) blocks: Vec<[f64; 6]>,
     /// Pinned particles.
     pub(super) held: Vec<bool>,
-    /// Particles without intact springs; empty if there are none.
+    /// Particles without intact springs.
     pub(super) isolated: Vec<bool>,
     /// Terms of regions.
     pub(super) regions: RankOneTerms,
@@ -80,12 +80,16 @@ impl System {
         })
     }
 
-    /// Marks particles whose springs have no stiffness as isolated.
-    pub(super) fn set_isolated(&mut self, particle_stiffness: &[f64]) {
+    /// Sets which particles are `held`, and marks those whose springs have no stiffness as isolated.
+    pub(super) fn set_loose(&mut self, held: &[bool], particle_stiffness: &[f64]) {
+        self.held.copy_from_slice(held);
         self.isolated.clear();
-        if particle_stiffness.contains(&0.0) {
-            self.isolated.extend(particle_stiffness.iter().map(|k| *k == 0.0));
-        }
+        self.isolated.extend(particle_stiffness.iter().map(|k| *k == 0.0));
+    }
+
+    /// Whether a particle does not move with its piece: it is pinned or isolated.
+    pub(super) fn is_loose(&self, particle: usize) -> bool {
+        self.held[particle] || self.isolated[particle]
     }
 }
 
