@@ -144,9 +144,9 @@ impl ContactFinder for CollisionScene<'_> {
                 let faces = skin.faces.sweep(&boxes, 0.0);
                 let released = skin.released(query.from);
                 for obstacle in 0..self.obstacles.len() {
-                    let pushed = pushed.iter().find(|pushed| (pushed.skin, pushed.obstacle) == (index, obstacle));
+                    let pushed = pushed.get(&(index, obstacle));
                     let released = match pushed {
-                        Some(pushed) => skin.releasing_particles(&pushed.particles),
+                        Some(pushed) => skin.releasing_particles(pushed),
                         None => skin.releasing(&released, self.caught_by(obstacle)),
                     };
                     self.against_obstacle(query, (skin, &released), &boxes, obstacle, &mut |meeting, tree| {
@@ -300,7 +300,7 @@ impl SkinObstaclePair<'_> {
         // Made before the loop: a thread of the pool that waits for another's tree could wait forever.
         let solid = self.solid_at_start(&bounds);
         let find_in = |(): &mut (), particles: &[u32], out: &mut Vec<Contact>| {
-            let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
+            let (mut faces, mut path) = (Vec::new(), Vec::new());
             for particle in particles.iter().filter(|particle| !has(&self.released.particles, **particle)) {
                 tree.overlapping(&self.boxes[0][*particle as usize], &mut faces);
                 let own = &self.boxes[0][*particle as usize];
@@ -310,10 +310,8 @@ impl SkinObstaclePair<'_> {
                 }
                 path_of(self.body.poses, *particle, &mut path);
                 let start = path[0];
-                hits.clear();
                 let closest_at_start = || self.closest_at_start(solid.as_ref()?, &bounds, start);
-                vertex::hits(&path, &self.still, (&faces, entry), &closest_at_start, &self.rules, &mut hits);
-                for hit in &hits {
+                for hit in vertex::hits(&path, &self.still, (&faces, entry), &closest_at_start, &self.rules) {
                     let corners = self.obstacle.surface.triangles[hit.face as usize];
                     let first = ([*particle, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]);
                     out.push(self.contact(first, (&corners, &hit.weights), hit.normal, hit.shift));
@@ -350,7 +348,7 @@ impl SkinObstaclePair<'_> {
     /// Sharp points of the obstacle against triangles of the skin.
     fn points(&self, tree: &SweptBoxTree<'_>, out: &mut Vec<Contact>) {
         let find_in = |(): &mut (), points: &[u32], out: &mut Vec<Contact>| {
-            let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
+            let (mut faces, mut path) = (Vec::new(), Vec::new());
             for point in points {
                 let region = swept::inflated(&self.boxes[1][*point as usize], self.rules.reach);
                 tree.overlapping(&region, &mut faces);
@@ -359,9 +357,7 @@ impl SkinObstaclePair<'_> {
                     continue;
                 }
                 path_of(self.still.poses, *point, &mut path);
-                hits.clear();
-                vertex::hits(&path, &self.body, (&faces, None), &|| None, &self.rules, &mut hits);
-                for hit in &hits {
+                for hit in vertex::hits(&path, &self.body, (&faces, None), &|| None, &self.rules) {
                     let [a, b, c] = self.skin.surface.triangles[hit.face as usize];
                     let [u, v, w] = hit.weights;
                     let first = ([a, b, c, 0], [u, v, w, 0.0]);
@@ -383,7 +379,7 @@ impl SkinObstaclePair<'_> {
                 tree.overlapping(&swept::bounds_of(&edge.ends, self.boxes[0]), &mut others);
                 for other in &others {
                     let other = &self.obstacle.surface.edges[self.obstacle.sharp_edges[*other as usize] as usize];
-                    if let Some(hit) = edge::hit(&self.body, edge, &self.still, other, &self.rules) {
+                    if let Some(hit) = edge::hit([&self.body, &self.still], [edge, other], &self.rules) {
                         let [s, t] = hit.shares;
                         let first = ([edge.ends[0], edge.ends[1], 0, 0], [1.0 - s, s, 0.0, 0.0]);
                         out.push(self.contact(first, (&other.ends, &[1.0 - t, t]), hit.normal, 0.0));

@@ -20,6 +20,7 @@ use numerics::closest_point::ClosestPoint;
 use numerics::tree::TriangleTree;
 use numerics::vector::DVec3;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Depth in gaps below which a point that is returned counts as touching.
 const TOUCHING: f64 = 0.01;
@@ -66,12 +67,8 @@ pub struct Separation<'a> {
     pub seconds: f64,
 }
 
-/// The particles of a skin that are being pushed out of an obstacle.
-pub(super) struct Pushed {
-    pub(super) skin: usize,
-    pub(super) obstacle: usize,
-    pub(super) particles: Vec<u32>,
-}
+/// The particles that are being pushed out of obstacles, by the indices of their skin and of the obstacle.
+type Pushed = BTreeMap<(usize, usize), Vec<u32>>;
 
 /// Where bodies are, relative to what should keep them out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -254,14 +251,14 @@ impl CollisionScene<'_> {
     }
 
     /// Contacts of the pairs that are being pushed apart; returns what is pushed out of obstacles.
-    pub(super) fn separate(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) -> Vec<Pushed> {
-        let mut pushed = Vec::new();
+    pub(super) fn separate(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) -> Pushed {
+        let mut pushed = Pushed::new();
         for overlap in self.separated() {
             match overlap.partner {
                 OverlapPartner::Ground => {}
                 OverlapPartner::Obstacle(obstacle) => {
                     let particles = self.out_of_obstacle(query, overlap, &self.obstacles[obstacle], out);
-                    pushed.push(Pushed { skin: overlap.skin, obstacle, particles });
+                    pushed.insert((overlap.skin, obstacle), particles);
                 }
                 OverlapPartner::Skin(index) => self.out_of_skin(query, overlap, &self.skins[index], out),
             }
