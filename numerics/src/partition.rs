@@ -2,7 +2,7 @@
 //! do results.
 
 use crate::parallel;
-use std::ops::Range;
+use std::ops::{Add, Range};
 
 /// Number of particles below which threads cost more than they gain.
 const WORTH_THREADS: usize = 1500;
@@ -128,8 +128,11 @@ impl Partition {
     }
 
     /// The sum of `work` over all ranges, in order.
-    pub fn sum<D: SplitAt>(&self, data: D, work: impl Fn(usize, D) -> f64 + Sync) -> f64 {
-        self.map(data, work).into_iter().fold(0.0, |sum, part| sum + part)
+    pub fn sum<D: SplitAt, R>(&self, data: D, work: impl Fn(usize, D) -> R + Sync) -> R
+    where
+        R: Add<Output = R> + Default + Send,
+    {
+        self.map(data, work).into_iter().fold(R::default(), |sum, part| sum + part)
     }
 
     /// Runs `work` for each range with its part of `data`.

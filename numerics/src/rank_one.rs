@@ -139,18 +139,25 @@ impl RankOneTerms {
         });
     }
 
+    /// The entries of a particle.
+    #[inline(always)]
+    fn at(&self, particle: usize) -> &[At] {
+        if self.is_empty() {
+            return &[];
+        }
+        &self.at[self.at_starts[particle] as usize..self.at_starts[particle + 1] as usize]
+    }
+
     /// Σ g·(g·p) at `particle`.
     #[inline(always)]
     pub fn push(&self, particle: usize) -> DVec3 {
-        let mine = &self.at[self.at_starts[particle] as usize..self.at_starts[particle + 1] as usize];
-        mine.iter().fold(DVec3::zeros(), |sum, at| sum + to_f64(at.along) * self.change[at.row as usize])
+        self.at(particle).iter().fold(DVec3::zeros(), |sum, at| sum + to_f64(at.along) * self.change[at.row as usize])
     }
 
     /// Adds `weight` times the diagonal block of `particle` to `block`, of the terms before `end`.
     #[inline(always)]
     pub fn add_block(&self, particle: usize, weight: f64, end: usize, block: &mut [f64; 6]) {
-        let mine = &self.at[self.at_starts[particle] as usize..self.at_starts[particle + 1] as usize];
-        for at in mine.iter().take_while(|at| (at.row as usize) < end) {
+        for at in self.at(particle).iter().take_while(|at| (at.row as usize) < end) {
             add_square(block, to_f64(at.along), weight);
         }
     }
@@ -158,8 +165,9 @@ impl RankOneTerms {
     /// Σ of `values` (by term) times `gradients` (by entry): a force on `particle`.
     #[inline(always)]
     pub fn gather(&self, particle: usize, values: &[f64], gradients: &[DVec3]) -> DVec3 {
-        let mine = &self.at[self.at_starts[particle] as usize..self.at_starts[particle + 1] as usize];
-        mine.iter().fold(DVec3::zeros(), |sum, at| sum + gradients[at.entry as usize] * values[at.row as usize])
+        self.at(particle)
+            .iter()
+            .fold(DVec3::zeros(), |sum, at| sum + gradients[at.entry as usize] * values[at.row as usize])
     }
 }
 

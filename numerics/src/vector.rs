@@ -8,10 +8,13 @@
 //! Limit: squares may overflow or vanish. In `f32` lengths between 1e-18 and 1e18 are safe; scale others by
 //! [`power_of_two_to_one`] first, which is exact. [`direction`] is safe for any length.
 
-use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector2, Vector3};
 
 /// x, y, z in `f64`: metres unless said otherwise.
 pub type DVec3 = Vector3<f64>;
+
+/// Two numbers that are summed together, in `f64`.
+pub type DVec2 = Vector2<f64>;
 
 /// Rows and columns in `f64`.
 pub type DMat3 = Matrix3<f64>;

@@ -1,7 +1,7 @@
 //! The skin of a body: its surface triangles, and which of their elements are too close at rest to count as contacts.
 
 use super::obstacle::{check_points, check_triangles, narrow};
-use super::surface::{Edge, Moment, NONE, TriangleSurface};
+use super::surface::{Edge, Lists, Moment, NONE, TriangleSurface};
 use super::{CaughtParticle, CollisionError};
 use crate::embedding::{EmbeddedPoint, with_riding};
 use crate::tets::SolidAngles;
@@ -31,8 +31,7 @@ pub struct BodySkin {
     /// Number of particles of the body, which other contact points ride along on.
     particles: usize,
     /// For each particle of the surface, those within two links, ascending; for each point that rides along, what it rides on.
-    starts: Vec<u32>,
-    rings: Vec<u32>,
+    rings: Lists,
 }
 
 impl BodySkin {
@@ -71,28 +70,27 @@ impl BodySkin {
                 let surface = TriangleSurface::new(rest.len(), triangles);
                 let turn =
                     surface.closed && triangles[0][0] as usize >= particles && signed_volume(triangles, rest) < 0.0;
-                if turn { TriangleSurface::new(rest.len(), &turned(triangles)) } else { surface }
+                let turned = || triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect::<Vec<_>>();
+                if turn { TriangleSurface::new(rest.len(), &turned()) } else { surface }
             })
             .collect();
         let edges = surfaces.iter().flat_map(|surface| &surface.edges).map(|edge| edge.ends);
         let carried = (particles as u32..).zip(riding);
         let carried = carried.flat_map(|(point, carrier)| carrier.sides().map(move |(particle, _)| [point, particle]));
-        let neighbours = Neighbours::new(rest.len(), links.iter().copied().chain(edges).chain(carried));
+        // The particles that share a link or an edge with each particle, or that it rides on.
+        let pairs = links.iter().copied().chain(edges).chain(carried).flat_map(|[a, b]| [[a, b], [b, a]]);
+        let neighbours = Lists::new(rest.len(), pairs.collect());
         let touching = touching(&surfaces, &neighbours, rest, particles);
-        let skin = |(surface, touching): (TriangleSurface, Vec<u32>)| {
-            let (starts, rings) = rings(&surface, &neighbours, rest.len(), particles);
-            Self {
-                particles,
-                faces: SweptElements::new(surface.triangles.clone(), rest),
-                edges: SweptElements::new(surface.edges.iter().map(|edge| edge.ends).collect(), rest),
-                rest: rest.to_vec(),
-                mean: surface.edges.iter().map(|edge| edge_length(edge, rest)).sum::<f64>()
-                    / surface.edges.len().max(1) as f64,
-                surface,
-                touching,
-                starts,
-                rings,
-            }
+        let skin = |(surface, touching): (TriangleSurface, Vec<u32>)| Self {
+            particles,
+            faces: SweptElements::new(surface.triangles.clone(), rest),
+            edges: SweptElements::new(surface.edges.iter().map(|edge| edge.ends).collect(), rest),
+            rest: rest.to_vec(),
+            mean: surface.edges.iter().map(|edge| edge_length(edge, rest)).sum::<f64>()
+                / surface.edges.len().max(1) as f64,
+            rings: rings(&surface, &neighbours, rest.len(), particles),
+            surface,
+            touching,
         };
         Ok(surfaces.into_iter().zip(touching).map(skin).collect())
     }
@@ -115,7 +113,7 @@ impl BodySkin {
 
     /// Surface particles within two links of one of them, itself included; the particles that a riding point rides on.
     pub(super) fn around(&self, particle: u32) -> &[u32] {
-        &self.rings[self.starts[particle as usize] as usize..self.starts[particle as usize + 1] as usize]
+        self.rings.of(particle)
     }
 
     /// Distance of a particle from a triangle at rest, metres.
@@ -195,55 +193,21 @@ impl BodySkin {
 #[derive(Clone, Debug, Default)]
 pub(super) struct ReleasedElements {
     /// Whether each edge is released; empty if none is.
-    edges: Vec<bool>,
+    pub(super) edges: Vec<bool>,
     /// Whether each triangle has a released edge.
-    faces: Vec<bool>,
+    pub(super) faces: Vec<bool>,
     /// Whether all edges of a surface particle are released.
-    particles: Vec<bool>,
+    pub(super) particles: Vec<bool>,
 }
 
-impl ReleasedElements {
-    pub(super) fn has_edge(&self, edge: u32) -> bool {
-        self.edges.get(edge as usize) == Some(&true)
-    }
-
-    pub(super) fn has_face(&self, face: u32) -> bool {
-        self.faces.get(face as usize) == Some(&true)
-    }
-
-    pub(super) fn has_particle(&self, particle: u32) -> bool {
-        self.particles.get(particle as usize) == Some(&true)
-    }
+/// Whether an element is released, according to a list that is empty if none is.
+pub(super) fn has(released: &[bool], element: u32) -> bool {
+    released.get(element as usize) == Some(&true)
 }
 
 fn edge_length(edge: &Edge, places: &[[f64; 3]]) -> f64 {
     let at = Moment::of(places);
     (at.position(edge.ends[0]) - at.position(edge.ends[1])).norm()
-}
-
-/// The particles that share a link or an edge with each particle.
-struct Neighbours {
-    starts: Vec<u32>,
-    pairs: Vec<[u32; 2]>,
-}
-
-impl Neighbours {
-    fn new(count: usize, links: impl Iterator<Item = [u32; 2]>) -> Self {
-        let mut pairs: Vec<[u32; 2]> = links.flat_map(|[a, b]| [[a, b], [b, a]]).collect();
-        pairs.sort_unstable();
-        pairs.dedup();
-        let mut starts = vec![0; count + 1];
-        pairs.iter().for_each(|pair| starts[pair[0] as usize + 1] += 1);
-        for particle in 0..count {
-            starts[particle + 1] += starts[particle];
-        }
-        Self { starts, pairs }
-    }
-
-    fn of(&self, particle: u32) -> impl Iterator<Item = u32> {
-        let range = self.starts[particle as usize] as usize..self.starts[particle as usize + 1] as usize;
-        self.pairs[range].iter().map(|pair| pair[1])
-    }
 }
 
 /// Six times the volume that triangles enclose.
@@ -253,19 +217,9 @@ fn signed_volume(triangles: &[[u32; 3]], places: &[[f64; 3]]) -> f64 {
     triangles.iter().map(corners).map(|[a, b, c]| a.dot(&b.cross(&c))).sum()
 }
 
-/// Triangles that face the other way.
-fn turned(triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
-    triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect()
-}
-
 /// The points of each surface and the particles within, ascending: a walk from all surfaces at once gives each particle
 /// to the first that reaches it. Particles outside what rides along on them touch nothing.
-fn touching(
-    surfaces: &[TriangleSurface],
-    neighbours: &Neighbours,
-    rest: &[[f64; 3]],
-    particles: usize,
-) -> Vec<Vec<u32>> {
+fn touching(surfaces: &[TriangleSurface], neighbours: &Lists, rest: &[[f64; 3]], particles: usize) -> Vec<Vec<u32>> {
     let mut skin_of = vec![NONE; rest.len()];
     let mut queue = VecDeque::new();
     for (skin, surface) in (0..).zip(surfaces) {
@@ -274,7 +228,7 @@ fn touching(
     while let Some((particle, skin)) = queue.pop_front() {
         if skin_of[particle as usize] == NONE {
             skin_of[particle as usize] = skin;
-            queue.extend(neighbours.of(particle).map(|other| (other, skin)));
+            queue.extend(neighbours.of(particle).iter().map(|other| (*other, skin)));
         }
     }
     let mut touching = vec![Vec::new(); surfaces.len()];
@@ -295,21 +249,21 @@ fn touching(
 
 /// For each surface particle, the surface particles within two links of it; for each point that rides along, the particles
 /// that it rides on.
-fn rings(surface: &TriangleSurface, neighbours: &Neighbours, count: usize, particles: usize) -> (Vec<u32>, Vec<u32>) {
+fn rings(surface: &TriangleSurface, neighbours: &Lists, count: usize, particles: usize) -> Lists {
     let mut outer = vec![false; count];
     surface.vertices.iter().for_each(|vertex| outer[*vertex as usize] = true);
-    let (mut starts, mut rings) = (vec![0], Vec::new());
+    let mut rings = Vec::new();
     for particle in 0..count as u32 {
+        let next = neighbours.of(particle);
         if particle as usize >= particles {
-            rings.extend(neighbours.of(particle).filter(|other| (*other as usize) < particles));
+            rings.extend(next.iter().filter(|other| (**other as usize) < particles).map(|other| [particle, *other]));
         } else if outer[particle as usize] {
-            let near = neighbours.of(particle).flat_map(|next| neighbours.of(next).chain([next]));
-            let mut ring: Vec<u32> = near.chain([particle]).filter(|other| outer[*other as usize]).collect();
+            let near = next.iter().flat_map(|next| neighbours.of(*next)).chain(next).chain([&particle]);
+            let mut ring: Vec<u32> = near.copied().filter(|other| outer[*other as usize]).collect();
             ring.sort_unstable();
             ring.dedup();
-            rings.extend(ring);
+            rings.extend(ring.into_iter().map(|other| [particle, other]));
         }
-        starts.push(rings.len() as u32);
     }
-    (starts, rings)
+    Lists::new(count, rings)
 }

@@ -25,15 +25,9 @@ const LEAN_THROUGH: f64 = 0.5;
 const LEAN_NEAR: f64 = 0.1;
 
 /// Tests two edges of different surfaces for contact.
-pub(super) fn hit(
-    first: &MovingSurface<'_>,
-    edge: &Edge,
-    second: &MovingSurface<'_>,
-    other: &Edge,
-    rules: &ContactRules,
-) -> Option<Hit> {
-    let pair = Pair { first: *first, edge, second: *second, other };
-    let last = first.poses.len() - 1;
+pub(super) fn hit(surfaces: [&MovingSurface<'_>; 2], edges: [&Edge; 2], rules: &ContactRules) -> Option<Hit> {
+    let pair = Pair { surfaces, edges };
+    let last = pair.last();
     let mut far = true;
     for piece in 0..last {
         let configuration = [pair.configuration(piece), pair.configuration(piece + 1)];
@@ -52,26 +46,27 @@ pub(super) fn hit(
 }
 
 struct Pair<'a> {
-    first: MovingSurface<'a>,
-    edge: &'a Edge,
-    second: MovingSurface<'a>,
-    other: &'a Edge,
+    surfaces: [&'a MovingSurface<'a>; 2],
+    edges: [&'a Edge; 2],
 }
 
 impl Pair<'_> {
+    /// Index of the last pose.
+    fn last(&self) -> usize {
+        self.surfaces[0].poses.len() - 1
+    }
+
     fn segments(&self, pose: usize) -> [[DVec3; 2]; 2] {
-        [
-            self.edge.ends.map(|end| Moment::of(self.first.poses[pose]).position(end)),
-            self.other.ends.map(|end| Moment::of(self.second.poses[pose]).position(end)),
-        ]
+        [0, 1].map(|side| {
+            let at = Moment::of(self.surfaces[side].poses[pose]);
+            self.edges[side].ends.map(|end| at.position(end))
+        })
     }
 
     /// Both edge vectors and the offset between their first ends.
     #[inline]
     fn configuration(&self, pose: usize) -> [DVec3; 3] {
-        let (one, two) = (self.first.poses[pose], self.second.poses[pose]);
-        let [p, q] = [DVec3::from(one[self.edge.ends[0] as usize]), DVec3::from(one[self.edge.ends[1] as usize])];
-        let [a, b] = [DVec3::from(two[self.other.ends[0] as usize]), DVec3::from(two[self.other.ends[1] as usize])];
+        let [[p, q], [a, b]] = self.segments(pose);
         [q - p, b - a, a - p]
     }
 
@@ -85,7 +80,7 @@ impl Pair<'_> {
             let Some(normal) = (d.cross(&e) * side).try_normalize(1e-12 * d.norm() * e.norm()) else { continue };
             let time = piece as f64 + t;
             if (d * s - r - e * u).norm() <= ON * size && self.faces(time, [s, u], normal, LEAN_THROUGH) {
-                let [d, e, _] = self.configuration(self.first.poses.len() - 1);
+                let [d, e, _] = self.configuration(self.last());
                 let last = (d.cross(&e) * side).try_normalize(1e-12 * d.norm() * e.norm());
                 // The edges may have rotated past each other; then the normal at the crossing is kept.
                 let normal = last.filter(|last| last.dot(&normal) > 0.5).unwrap_or(normal);
@@ -109,15 +104,18 @@ impl Pair<'_> {
         if !self.faces(pose as f64, shares, normal, LEAN_NEAR) {
             return None;
         }
-        let last = between(self.segments(self.first.poses.len() - 1), shares);
+        let last = between(self.segments(self.last()), shares);
         let turned = last.try_normalize(0.0).filter(|last| last.dot(&normal) > 0.0);
         Some(Hit { shares, normal: turned.unwrap_or(normal) })
     }
 
     /// Whether the normal points out of the second surface at its edge, and into the first.
-    fn faces(&self, time: f64, [s, u]: [f64; 2], normal: DVec3, lean: f64) -> bool {
-        is_ridge(self.second.surface, &self.second.moment(time), self.other, u, normal, lean)
-            && is_ridge(self.first.surface, &self.first.moment(time), self.edge, s, -normal, lean)
+    fn faces(&self, time: f64, shares: [f64; 2], normal: DVec3, lean: f64) -> bool {
+        let is_ridge = |side: usize, out: DVec3| {
+            let on = self.surfaces[side];
+            is_ridge(on.surface, &on.moment(time), self.edges[side], shares[side], out, lean)
+        };
+        is_ridge(1, normal) && is_ridge(0, -normal)
     }
 }
 

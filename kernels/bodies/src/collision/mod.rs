@@ -25,7 +25,7 @@ mod vertex;
 
 use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
 pub use body_skin::BodySkin;
-use body_skin::ReleasedElements;
+use body_skin::{ReleasedElements, has};
 pub use caught::CaughtParticle;
 pub use motion::ObstaclePose;
 use numerics::closest_point::ClosestPoint;
@@ -144,9 +144,9 @@ impl ContactFinder for CollisionScene<'_> {
                 let faces = skin.faces.sweep(&boxes, 0.0);
                 let released = skin.released(query.from);
                 for obstacle in 0..self.obstacles.len() {
-                    let pushed = pushed.iter().find(|pushed| (pushed.skin, pushed.obstacle) == (index, obstacle));
+                    let pushed = pushed.get(&(index, obstacle));
                     let released = match pushed {
-                        Some(pushed) => skin.releasing_particles(&pushed.particles),
+                        Some(pushed) => skin.releasing_particles(pushed),
                         None => skin.releasing(&released, self.caught_by(obstacle)),
                     };
                     self.against_obstacle(query, (skin, &released), &boxes, obstacle, &mut |meeting, tree| {
@@ -300,8 +300,8 @@ impl SkinObstaclePair<'_> {
         // Made before the loop: a thread of the pool that waits for another's tree could wait forever.
         let solid = self.solid_at_start(&bounds);
         let find_in = |(): &mut (), particles: &[u32], out: &mut Vec<Contact>| {
-            let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
-            for particle in particles.iter().filter(|particle| !self.released.has_particle(**particle)) {
+            let (mut faces, mut path) = (Vec::new(), Vec::new());
+            for particle in particles.iter().filter(|particle| !has(&self.released.particles, **particle)) {
                 tree.overlapping(&self.boxes[0][*particle as usize], &mut faces);
                 let own = &self.boxes[0][*particle as usize];
                 let entry = self.entry(*particle);
@@ -310,10 +310,8 @@ impl SkinObstaclePair<'_> {
                 }
                 path_of(self.body.poses, *particle, &mut path);
                 let start = path[0];
-                hits.clear();
                 let closest_at_start = || self.closest_at_start(solid.as_ref()?, &bounds, start);
-                vertex::hits(&path, &self.still, (&faces, entry), &closest_at_start, &self.rules, &mut hits);
-                for hit in &hits {
+                for hit in vertex::hits(&path, &self.still, (&faces, entry), &closest_at_start, &self.rules) {
                     let corners = self.obstacle.surface.triangles[hit.face as usize];
                     let first = ([*particle, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]);
                     out.push(self.contact(first, (&corners, &hit.weights), hit.normal, hit.shift));
@@ -327,7 +325,7 @@ impl SkinObstaclePair<'_> {
     /// its `bounds`.
     fn solid_at_start(&self, bounds: &Cuboid) -> Option<TriangleTree> {
         let may_be_inside = |particle: &u32| {
-            !self.released.has_particle(*particle) && swept::overlap(&self.boxes[0][*particle as usize], bounds)
+            !has(&self.released.particles, *particle) && swept::overlap(&self.boxes[0][*particle as usize], bounds)
         };
         if !self.obstacle.surface.closed || !self.skin.touching.iter().any(may_be_inside) {
             return None;
@@ -350,18 +348,16 @@ impl SkinObstaclePair<'_> {
     /// Sharp points of the obstacle against triangles of the skin.
     fn points(&self, tree: &SweptBoxTree<'_>, out: &mut Vec<Contact>) {
         let find_in = |(): &mut (), points: &[u32], out: &mut Vec<Contact>| {
-            let (mut faces, mut path, mut hits) = (Vec::new(), Vec::new(), Vec::new());
+            let (mut faces, mut path) = (Vec::new(), Vec::new());
             for point in points {
                 let region = swept::inflated(&self.boxes[1][*point as usize], self.rules.reach);
                 tree.overlapping(&region, &mut faces);
-                faces.retain(|face| !self.released.has_face(*face));
+                faces.retain(|face| !has(&self.released.faces, *face));
                 if faces.is_empty() {
                     continue;
                 }
                 path_of(self.still.poses, *point, &mut path);
-                hits.clear();
-                vertex::hits(&path, &self.body, (&faces, None), &|| None, &self.rules, &mut hits);
-                for hit in &hits {
+                for hit in vertex::hits(&path, &self.body, (&faces, None), &|| None, &self.rules) {
                     let [a, b, c] = self.skin.surface.triangles[hit.face as usize];
                     let [u, v, w] = hit.weights;
                     let first = ([a, b, c, 0], [u, v, w, 0.0]);
@@ -378,12 +374,12 @@ impl SkinObstaclePair<'_> {
         let indices: Vec<u32> = (0..self.skin.surface.edges.len() as u32).collect();
         let find_in = |(): &mut (), edges: &[u32], out: &mut Vec<Contact>| {
             let mut others = Vec::new();
-            for index in edges.iter().filter(|edge| !self.released.has_edge(**edge)) {
+            for index in edges.iter().filter(|edge| !has(&self.released.edges, **edge)) {
                 let edge = &self.skin.surface.edges[*index as usize];
                 tree.overlapping(&swept::bounds_of(&edge.ends, self.boxes[0]), &mut others);
                 for other in &others {
                     let other = &self.obstacle.surface.edges[self.obstacle.sharp_edges[*other as usize] as usize];
-                    if let Some(hit) = edge::hit(&self.body, edge, &self.still, other, &self.rules) {
+                    if let Some(hit) = edge::hit([&self.body, &self.still], [edge, other], &self.rules) {
                         let [s, t] = hit.shares;
                         let first = ([edge.ends[0], edge.ends[1], 0, 0], [1.0 - s, s, 0.0, 0.0]);
                         out.push(self.contact(first, (&other.ends, &[1.0 - t, t]), hit.normal, 0.0));
@@ -403,17 +399,15 @@ impl SkinObstaclePair<'_> {
         shift: f64,
     ) -> Contact {
         let (gap, times) = (self.rules.gap, self.query.times);
-        let [(_, raised), (end, raised_end)] = [self.still.start(), self.still.end()].map(|at| {
-            let touched = points.iter().zip(shares).map(|(point, share)| at.position(*point) * *share).sum();
-            (touched, self.scene.raised(touched, normal, gap))
-        });
+        let touched = [self.still.start(), self.still.end()].map(|at| at.weighted(points, shares));
+        let [raised, raised_end] = touched.map(|touched| self.scene.raised(touched, normal, gap));
         let seconds = self.obstacle.seconds * (times[1] - times[0]);
         let stopping = if seconds > 0.0 { (raised_end - raised) / seconds } else { DVec3::zeros() };
         Contact {
             points: own,
             weights,
             normal: normal.into(),
-            offset: normal.dot(&(end + raised_end)) - shift,
+            offset: normal.dot(&(touched[1] + raised_end)) - shift,
             gap,
             velocity: (self.obstacle.velocity_of(times[1], points, shares) + stopping).into(),
             friction: self.obstacle.friction * self.scene.friction_scale(&own, &weights),

@@ -53,7 +53,9 @@ impl Obstacle {
             check_points(&pose.positions)?;
         }
         for (what, value) in [("seconds", seconds), ("thickness", thickness), ("friction", friction)] {
-            check_number(what, value)?;
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(CollisionError::Number { what, value });
+            }
         }
         let surface = TriangleSurface::new(points, triangles);
         let first = &poses[0].positions[..];
@@ -136,10 +138,6 @@ pub(super) fn check_points(points: &[[f64; 3]]) -> Result<(), CollisionError> {
         Some(index) => Err(CollisionError::Point(index)),
         None => Ok(()),
     }
-}
-
-pub(super) fn check_number(what: &'static str, value: f64) -> Result<(), CollisionError> {
-    if value.is_finite() && value >= 0.0 { Ok(()) } else { Err(CollisionError::Number { what, value }) }
 }
 
 /// Whether the two triangles at an edge are coplanar.

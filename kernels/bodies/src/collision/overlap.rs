@@ -11,14 +11,16 @@
 //!
 //! Limit: bodies of which only edges cross, with no point of one inside the other, are not seen.
 
+use super::obstacle::narrow;
 use super::surface::{Moment, TriangleSurface};
 use super::{BodySkin, CollisionScene, Obstacle};
 use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
 use crate::tets::{Enclosure, Exit, bounds};
 use numerics::closest_point::ClosestPoint;
 use numerics::tree::TriangleTree;
-use numerics::vector::{DVec3, to_f32};
+use numerics::vector::DVec3;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Depth in gaps below which a point that is returned counts as touching.
 const TOUCHING: f64 = 0.01;
@@ -65,12 +67,8 @@ pub struct Separation<'a> {
     pub seconds: f64,
 }
 
-/// The particles of a skin that are being pushed out of an obstacle.
-pub(super) struct Pushed {
-    pub(super) skin: usize,
-    pub(super) obstacle: usize,
-    pub(super) particles: Vec<u32>,
-}
+/// The particles that are being pushed out of obstacles, by the indices of their skin and of the obstacle.
+type Pushed = BTreeMap<(usize, usize), Vec<u32>>;
 
 /// Where bodies are, relative to what should keep them out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -156,10 +154,11 @@ impl<'a> Side<'a> {
         way
     }
 
-    /// Barycentric weights of the point of a triangle where a point of another side leaves it.
-    fn weights(&self, other: &Self, exit: &Exit, direction: DVec3) -> [f64; 3] {
+    /// The triangle by which a point of another side leaves it, and the barycentric weights of where.
+    fn place(&self, other: &Self, exit: &Exit, direction: DVec3) -> ([u32; 3], [f64; 3]) {
         let passed = DVec3::from(other.points[exit.point as usize]) + direction * exit.distance;
-        ClosestPoint::on(exit.face, passed, self.surface.corners(&Moment::of(self.points), exit.face)).weights
+        let corners = self.surface.corners(&Moment::of(self.points), exit.face);
+        (self.surface.triangles[exit.face as usize], ClosestPoint::on(exit.face, passed, corners).weights)
     }
 
     /// Sum of the area vectors of its triangles that are inside, given which of its points are.
@@ -188,16 +187,16 @@ impl CollisionScene<'_> {
                     let gaps = [obstacle.thickness; 2];
                     let side = Side::new(x, &own.touching, &own.surface, gaps);
                     let other = Side::new(points, &obstacle.surface.vertices, &obstacle.surface, gaps);
-                    let ways = Ways { ground: self.room(own, x), gap: obstacle.thickness };
-                    let [marked, _] = ways.add(skin, OverlapPartner::Obstacle(index), [&side, &other], &mut found);
-                    mark(&marked);
+                    let pair = (skin, OverlapPartner::Obstacle(index));
+                    let room = self.room(own, x);
+                    mark(&add_overlap(pair, [&side, &other], room, obstacle.thickness, &mut found)[0]);
                 }
             }
             for (index, next) in self.skins.iter().enumerate().skip(skin + 1) {
                 if self.body_contact.is_some() && overlap(&boxes[skin], &boxes[index]) {
                     let [side, other] = [own, next].map(|of| Side::new(x, &of.touching, &of.surface, [thickness; 2]));
-                    let ways = Ways { ground: None, gap: thickness };
-                    let marked = ways.add(skin, OverlapPartner::Skin(index), [&side, &other], &mut found);
+                    let pair = (skin, OverlapPartner::Skin(index));
+                    let marked = add_overlap(pair, [&side, &other], None, thickness, &mut found);
                     marked.iter().for_each(|marked| mark(marked));
                 }
             }
@@ -228,10 +227,15 @@ impl CollisionScene<'_> {
         }
     }
 
-    /// The overlap of a skin and a partner that are being pushed apart.
+    /// The overlaps that are being pushed apart.
+    fn separated(&self) -> &[Overlap] {
+        let separation = self.separation.filter(|separation| separation.over < separation.frames);
+        separation.map_or(&[], |separation| separation.overlaps)
+    }
+
+    /// That of a skin and a partner.
     pub(super) fn separating(&self, skin: usize, partner: OverlapPartner) -> Option<&Overlap> {
-        let separation = self.separation.filter(|separation| separation.over < separation.frames)?;
-        separation.overlaps.iter().find(|overlap| overlap.skin == skin && overlap.partner == partner)
+        self.separated().iter().find(|overlap| overlap.skin == skin && overlap.partner == partner)
     }
 
     /// The depth below its gap that a point may have at the end of the query, if it has `depth` at its start, and the
@@ -247,20 +251,33 @@ impl CollisionScene<'_> {
     }
 
     /// Contacts of the pairs that are being pushed apart; returns what is pushed out of obstacles.
-    pub(super) fn separate(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) -> Vec<Pushed> {
-        let mut pushed = Vec::new();
-        let overlaps = self.separation.map_or(&[][..], |separation| separation.overlaps);
-        for overlap in overlaps.iter().filter(|overlap| self.separating(overlap.skin, overlap.partner).is_some()) {
+    pub(super) fn separate(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) -> Pushed {
+        let mut pushed = Pushed::new();
+        for overlap in self.separated() {
             match overlap.partner {
                 OverlapPartner::Ground => {}
                 OverlapPartner::Obstacle(obstacle) => {
                     let particles = self.out_of_obstacle(query, overlap, &self.obstacles[obstacle], out);
-                    pushed.push(Pushed { skin: overlap.skin, obstacle, particles });
+                    pushed.insert((overlap.skin, obstacle), particles);
                 }
                 OverlapPartner::Skin(index) => self.out_of_skin(query, overlap, &self.skins[index], out),
             }
         }
         pushed
+    }
+
+    /// The contact of points with these weights, without friction, that allows the depth of an `exit` from what is at rest
+    /// at the origin, and pushes along `normal`.
+    fn pushing(
+        &self,
+        (query, overlap, gap): (&ContactQuery<'_>, &Overlap, f64),
+        exit: &Exit,
+        (points, weights): ([u32; 4], [f64; 4]),
+        normal: DVec3,
+    ) -> Contact {
+        let (allowed, speed) = self.allowed(overlap, exit.distance + gap, query.times);
+        let (velocity, normal) = ((normal * speed).into(), normal.into());
+        Contact { points, weights, normal, offset: -allowed, gap, velocity, friction: 0.0, jammed: false }
     }
 
     fn out_of_skin(&self, query: &ContactQuery<'_>, overlap: &Overlap, other: &BodySkin, out: &mut Vec<Contact>) {
@@ -270,19 +287,9 @@ impl CollisionScene<'_> {
             .map(|skin| Side::new(query.from, &skin.touching, &skin.surface, [params.thickness, 0.0]));
         for ([inner, outer], normal) in [([&first, &other], direction), ([&other, &first], -direction)] {
             for exit in inner.exits(outer, inner.candidates, normal) {
-                let [a, b, c] = outer.surface.triangles[exit.face as usize];
-                let [u, v, w] = outer.weights(inner, &exit, normal);
-                let (allowed, speed) = self.allowed(overlap, exit.distance + params.thickness, query.times);
-                out.push(Contact {
-                    points: [exit.point, a, b, c],
-                    weights: [1.0, -u, -v, -w],
-                    normal: normal.into(),
-                    offset: -allowed,
-                    gap: params.thickness,
-                    velocity: (normal * speed).into(),
-                    friction: 0.0,
-                    jammed: false,
-                });
+                let ([a, b, c], [u, v, w]) = outer.place(inner, &exit, normal);
+                let sides = ([exit.point, a, b, c], [1.0, -u, -v, -w]);
+                out.push(self.pushing((query, overlap, params.thickness), &exit, sides, normal));
             }
         }
     }
@@ -298,35 +305,23 @@ impl CollisionScene<'_> {
         let first = &self.skins[overlap.skin];
         let normal = DVec3::from(overlap.direction);
         let [start, end] = query.times.map(|time| other.at(time));
-        let mut push = |exit: &Exit, (own, weights): ([u32; 4], [f64; 4]), (points, shares): (&[u32], &[f64])| {
-            let (allowed, speed) = self.allowed(overlap, exit.distance + other.thickness, query.times);
-            let reached: DVec3 =
-                points.iter().zip(shares).map(|(point, share)| DVec3::from(end[*point as usize]) * *share).sum();
-            let velocity = other.velocity_of(query.times[1], points, shares) + normal * speed;
-            out.push(Contact {
-                points: own,
-                weights,
-                normal: normal.into(),
-                offset: normal.dot(&reached) - allowed,
-                gap: other.thickness,
-                velocity: velocity.into(),
-                friction: 0.0,
-                jammed: false,
-            });
+        let mut push = |exit: &Exit, own: ([u32; 4], [f64; 4]), points: &[u32], shares: &[f64]| {
+            let contact = self.pushing((query, overlap, other.thickness), exit, own, normal);
+            let reached = Moment::of(&end).weighted(points, shares);
+            let velocity = other.velocity_of(query.times[1], points, shares) + DVec3::from(contact.velocity);
+            out.push(Contact { offset: normal.dot(&reached) + contact.offset, velocity: velocity.into(), ..contact });
         };
         let gaps = [other.thickness, 0.0];
         let body = Side::new(query.from, &first.touching, &first.surface, gaps);
         let solid = Side::new(&start, &other.surface.vertices, &other.surface, gaps);
         let exits = body.exits(&solid, body.candidates, normal);
         for exit in &exits {
-            let shares = solid.weights(&body, exit, normal);
-            let corners = other.surface.triangles[exit.face as usize];
-            push(exit, ([exit.point, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]), (&corners, &shares));
+            let (corners, shares) = solid.place(&body, exit, normal);
+            push(exit, ([exit.point, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]), &corners, &shares);
         }
         for exit in solid.exits(&body, solid.candidates, -normal) {
-            let [a, b, c] = first.surface.triangles[exit.face as usize];
-            let [u, v, w] = body.weights(&solid, &exit, -normal);
-            push(&exit, ([a, b, c, 0], [u, v, w, 0.0]), (&[exit.point], &[1.0]));
+            let ([a, b, c], [u, v, w]) = body.place(&solid, &exit, -normal);
+            push(&exit, ([a, b, c, 0], [u, v, w, 0.0]), &[exit.point], &[1.0]);
         }
         exits.iter().map(|exit| exit.point).collect()
     }
@@ -344,110 +339,83 @@ impl CollisionScene<'_> {
             found.deepest = heights.fold(found.deepest, |deepest, height| deepest.max(ground.thickness - height));
         }
         let ends: Vec<_> = self.obstacles.iter().map(|obstacle| obstacle.at(1.0)).collect();
-        let obstacles = self
-            .obstacles
-            .iter()
-            .zip(&ends)
-            .map(|(obstacle, at)| (None, SolidShape { surface: &obstacle.surface, at, gap: obstacle.thickness }));
-        let skins = self.skins.iter().enumerate().filter_map(|(index, skin)| {
-            Some((Some(index), SolidShape { surface: &skin.surface, at: x, gap: self.body_contact?.thickness }))
-        });
+        let obstacles = self.obstacles.iter().zip(&ends);
+        let obstacles = obstacles.map(|(obstacle, at)| (None, &obstacle.surface, &at[..], obstacle.thickness));
+        let skins = self.skins.iter().enumerate();
+        let skins =
+            skins.filter_map(|(index, skin)| Some((Some(index), &skin.surface, x, self.body_contact?.thickness)));
         let mut inside = vec![false; x.len()];
         let boxes: Vec<_> = self.skins.iter().map(|skin| skin_bounds(skin, x)).collect();
-        for (own, solid) in obstacles.chain(skins).filter(|(_, solid)| solid.surface.closed) {
-            let around = bounds(solid.surface.vertices.iter().map(|vertex| solid.at[*vertex as usize]));
+        for (own, surface, at, gap) in obstacles.chain(skins).filter(|solid| solid.1.closed) {
+            let around = bounds(surface.vertices.iter().map(|vertex| at[*vertex as usize]));
             let others =
                 (0..).zip(self.skins).filter(|(skin, _)| Some(*skin) != own && overlap(&boxes[*skin], &around));
             let near = others.flat_map(|(_, skin)| &skin.touching).copied();
             let near: Vec<u32> = near.filter(|point| overlap(&[x[*point as usize]; 2], &around)).collect();
-            solid.depths(x, &near, &mut inside, &mut found.deepest);
+            if near.is_empty() {
+                continue;
+            }
+            // Points outside are left to contacts, which know how near they are.
+            let mut within = vec![false; x.len()];
+            Enclosure::new(at, &surface.triangles, 0.0).mark(x, &near, &mut within);
+            let within: Vec<u32> = near.into_iter().filter(|point| within[*point as usize]).collect();
+            if within.is_empty() {
+                continue;
+            }
+            let tree = TriangleTree::build(&narrow(at), &surface.triangles);
+            let from: Vec<_> = within.iter().map(|point| x[*point as usize]).collect();
+            for (point, closest) in within.iter().zip(tree.closest_each(&narrow(&from), f32::INFINITY)) {
+                let Some(distance) = closest.map(|closest| f64::from(closest.distance)) else { continue };
+                inside[*point as usize] |= distance > TOUCHING * gap;
+                found.deepest = found.deepest.max(gap + distance);
+            }
         }
         found.inside = inside.iter().filter(|inside| **inside).count();
         found
     }
 }
 
-/// A surface that keeps points out.
-struct SolidShape<'a> {
-    surface: &'a TriangleSurface,
-    at: &'a [[f64; 3]],
-    gap: f64,
-}
-
-impl SolidShape<'_> {
-    /// Marks those of the `near` points that are `inside`, and raises `deepest` to the largest depth of one below the gap.
-    /// Points outside are left to contacts, which know how near they are.
-    fn depths(&self, points: &[[f64; 3]], near: &[u32], inside: &mut [bool], deepest: &mut f64) {
-        if near.is_empty() {
-            return;
-        }
-        let mut within = vec![false; points.len()];
-        Enclosure::new(self.at, &self.surface.triangles, 0.0).mark(points, near, &mut within);
-        let within: Vec<u32> = near.iter().filter(|point| within[**point as usize]).copied().collect();
-        if within.is_empty() {
-            return;
-        }
-        let narrow = |p: &[f64; 3]| to_f32(DVec3::from(*p));
-        let corners: Vec<_> = self.at.iter().map(narrow).collect();
-        let tree = TriangleTree::build(&corners, &self.surface.triangles);
-        let from: Vec<_> = within.iter().map(|point| narrow(&points[*point as usize])).collect();
-        for (point, closest) in within.iter().zip(tree.closest_each(&from, f32::INFINITY)) {
-            let Some(distance) = closest.map(|closest| f64::from(closest.distance)) else { continue };
-            inside[*point as usize] |= distance > TOUCHING * self.gap;
-            *deepest = deepest.max(self.gap + distance);
-        }
-    }
-}
-
-/// The ways in which a body may leave what it overlaps.
-struct Ways {
-    /// The upward direction of the ground, and how far it may be pushed down.
+/// Adds the overlap of two sides that keep a distance of `gap`, if there is one; returns which points of both are inside the
+/// other. `ground` is its upward direction, and how far the first side may be pushed down.
+fn add_overlap(
+    (skin, partner): (usize, OverlapPartner),
+    [side, other]: [&Side<'_>; 2],
     ground: Option<(DVec3, f64)>,
     gap: f64,
-}
-
-impl Ways {
-    /// Adds the overlap of two sides, if there is one; returns which points of both are inside the other.
-    fn add(
-        &self,
-        skin: usize,
-        partner: OverlapPartner,
-        [side, other]: [&Side<'_>; 2],
-        found: &mut Vec<Overlap>,
-    ) -> [Vec<bool>; 2] {
-        let inside = [side.within(other), other.within(side)];
-        let [own, others] = [(side, &inside[0]), (other, &inside[1])].map(|(side, inside)| {
-            let all = side.candidates.iter().copied().filter(|point| inside[*point as usize]);
-            all.collect::<Vec<u32>>()
-        });
-        if own.is_empty() && others.is_empty() {
-            return inside;
-        }
-        let shrinks = other.area_within(&inside[1]) - side.area_within(&inside[0]);
-        let lattice = (0..27).filter(|k| *k != 13).map(|k| {
-            let axis = |k: i32| f64::from(k % 3 - 1);
-            DVec3::new(axis(k), axis(k / 3), axis(k / 9))
-        });
-        let directions = std::iter::once(shrinks).chain(lattice).filter_map(|direction| direction.try_normalize(0.0));
-        let is_allowed = |direction: DVec3, depth: f64| {
-            self.ground.is_none_or(|(up, room)| direction.dot(&up) > -1e-9 || -direction.dot(&up) * depth <= room)
-        };
-        let (mut depth, mut shortest) = (f64::INFINITY, None);
-        for direction in directions {
-            let (out, past) = (side.exits(other, &own, direction), other.exits(side, &others, -direction));
-            let points = out.iter().chain(&past).map(|exit| exit.distance).fold(0.0, f64::max);
-            if points < depth && is_allowed(direction, points + self.gap) {
-                let lines = side.way_out(other, direction, self.gap).max(other.way_out(side, -direction, self.gap));
-                if points.max(lines) < depth && is_allowed(direction, points.max(lines) + self.gap) {
-                    (depth, shortest) = (points.max(lines), Some(direction));
-                }
+    found: &mut Vec<Overlap>,
+) -> [Vec<bool>; 2] {
+    let inside = [side.within(other), other.within(side)];
+    let [own, others] = [(side, &inside[0]), (other, &inside[1])].map(|(side, inside)| {
+        let all = side.candidates.iter().copied().filter(|point| inside[*point as usize]);
+        all.collect::<Vec<u32>>()
+    });
+    if own.is_empty() && others.is_empty() {
+        return inside;
+    }
+    let shrinks = other.area_within(&inside[1]) - side.area_within(&inside[0]);
+    let lattice = (0..27).filter(|k| *k != 13).map(|k| {
+        let axis = |k: i32| f64::from(k % 3 - 1);
+        DVec3::new(axis(k), axis(k / 3), axis(k / 9))
+    });
+    let directions = std::iter::once(shrinks).chain(lattice).filter_map(|direction| direction.try_normalize(0.0));
+    let is_allowed = |direction: DVec3, depth: f64| {
+        ground.is_none_or(|(up, room)| direction.dot(&up) > -1e-9 || -direction.dot(&up) * depth <= room)
+    };
+    let (mut depth, mut shortest) = (f64::INFINITY, None);
+    for direction in directions {
+        let (out, past) = (side.exits(other, &own, direction), other.exits(side, &others, -direction));
+        let points = out.iter().chain(&past).map(|exit| exit.distance).fold(0.0, f64::max);
+        if points < depth && is_allowed(direction, points + gap) {
+            let lines = side.way_out(other, direction, gap).max(other.way_out(side, -direction, gap));
+            if points.max(lines) < depth && is_allowed(direction, points.max(lines) + gap) {
+                (depth, shortest) = (points.max(lines), Some(direction));
             }
         }
-        if let Some(direction) = shortest {
-            found.push(Overlap { skin, partner, direction: direction.into(), depth: depth + self.gap });
-        }
-        inside
     }
+    if let Some(direction) = shortest {
+        found.push(Overlap { skin, partner, direction: direction.into(), depth: depth + gap });
+    }
+    inside
 }
 
 /// Points, with those of a surface moved below it by a distance.

@@ -119,7 +119,7 @@ impl Pair<'_> {
         let [first, second] = self.skins;
         let on = MovingSurface { surface: &second.surface, poses: &poses };
         let find_in = |marks: &mut Marks, particles: &[u32], out: &mut Vec<Contact>| {
-            let (mut faces, mut hits) = (Vec::new(), Vec::new());
+            let mut faces = Vec::new();
             for particle in particles {
                 boxes.faces.overlapping(&self.points[*particle as usize], &mut faces);
                 if self.self_contact {
@@ -129,10 +129,8 @@ impl Pair<'_> {
                 if faces.is_empty() {
                     continue;
                 }
-                hits.clear();
                 let path = poses.map(|pose| DVec3::from(pose[*particle as usize]));
-                vertex::hits(&path, &on, (&faces, None), &|| None, &self.rules, &mut hits);
-                for hit in &hits {
+                for hit in vertex::hits(&path, &on, (&faces, None), &|| None, &self.rules) {
                     let [a, b, c] = second.surface.triangles[hit.face as usize];
                     let [u, v, w] = hit.weights;
                     let gap = self.gap(|| first.rest_to_face(*particle, hit.face));
@@ -163,7 +161,7 @@ impl Pair<'_> {
                 }
                 for other_index in &others {
                     let other = &second.surface.edges[*other_index as usize];
-                    if let Some(hit) = edge::hit(&one, edge, &two, other, &self.rules) {
+                    if let Some(hit) = edge::hit([&one, &two], [edge, other], &self.rules) {
                         let [s, t] = hit.shares;
                         let ([a, b], [c, d]) = (edge.ends, other.ends);
                         let gap = self.gap(|| first.rest_between(*index, *other_index));

@@ -17,8 +17,7 @@ pub(super) struct TriangleSurface {
     /// Edges of each triangle, from corner k to k + 1.
     sides: Vec<[u32; 3]>,
     /// Edges at each point.
-    starts: Vec<u32>,
-    around: Vec<u32>,
+    around: Lists,
     /// Points used by triangles, ascending.
     pub(super) vertices: Vec<u32>,
     /// Whether every edge has two consistently oriented triangles.
@@ -33,6 +32,28 @@ pub(super) struct Edge {
     pub(super) faces: [u32; 2],
     /// The corners of these triangles that are not on the edge.
     pub(super) opposite: [u32; 2],
+}
+
+/// A list of numbers for each point.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Lists {
+    starts: Vec<u32>,
+    items: Vec<u32>,
+}
+
+impl Lists {
+    /// Those of pairs of a point and a number, ascending and each once.
+    pub(super) fn new(points: usize, mut pairs: Vec<[u32; 2]>) -> Self {
+        pairs.sort_unstable();
+        pairs.dedup();
+        let start = |point: u32| pairs.partition_point(|pair| pair[0] < point) as u32;
+        Self { starts: (0..=points as u32).map(start).collect(), items: pairs.iter().map(|pair| pair[1]).collect() }
+    }
+
+    /// The list of a point.
+    pub(super) fn of(&self, point: u32) -> &[u32] {
+        &self.items[self.starts[point as usize] as usize..self.starts[point as usize + 1] as usize]
+    }
 }
 
 /// Positions of points, metres.
@@ -59,6 +80,11 @@ impl<'a> Moment<'a> {
         let to = DVec3::from(self.to[point as usize]);
         if self.share >= 1.0 { to } else { DVec3::from(self.from[point as usize]).lerp(&to, self.share) }
     }
+
+    /// The sum of the positions of points times their weights.
+    pub(super) fn weighted(&self, points: &[u32], weights: &[f64]) -> DVec3 {
+        points.iter().zip(weights).map(|(point, weight)| self.position(*point) * *weight).sum()
+    }
 }
 
 impl TriangleSurface {
@@ -76,8 +102,7 @@ impl TriangleSurface {
             triangles: triangles.to_vec(),
             edges: Vec::with_capacity(halves.len() / 2),
             sides: vec![[NONE; 3]; triangles.len()],
-            starts: vec![0; points + 1],
-            around: Vec::new(),
+            around: Lists::default(),
             vertices: Vec::new(),
             closed: !halves.is_empty(),
         };
@@ -95,38 +120,32 @@ impl TriangleSurface {
             surface.closed &= group.len() == 2 && forwards.count() == 1;
             surface.edges.push(edge);
         }
-        surface.gather_edges(points);
+        let ends = (0..).zip(&surface.edges).flat_map(|(index, edge)| edge.ends.map(|end| [end, index]));
+        surface.around = Lists::new(points, ends.collect());
+        surface.vertices = (0..points as u32).filter(|point| !surface.around.of(*point).is_empty()).collect();
         surface
-    }
-
-    fn gather_edges(&mut self, points: usize) {
-        let ends = || self.edges.iter().flat_map(|edge| edge.ends);
-        for end in ends() {
-            self.starts[end as usize + 1] += 1;
-        }
-        self.vertices = (0..points as u32).filter(|point| self.starts[*point as usize + 1] > 0).collect();
-        for point in 0..points {
-            self.starts[point + 1] += self.starts[point];
-        }
-        let mut next = self.starts.clone();
-        let mut around = vec![0; 2 * self.edges.len()];
-        for (index, end) in ends().enumerate() {
-            around[next[end as usize] as usize] = (index / 2) as u32;
-            next[end as usize] += 1;
-        }
-        self.around = around;
     }
 
     /// Edges at a point.
     pub(super) fn edges_at(&self, point: u32) -> impl Iterator<Item = &Edge> {
-        let range = self.starts[point as usize] as usize..self.starts[point as usize + 1] as usize;
-        self.around[range].iter().map(|edge| &self.edges[*edge as usize])
+        self.around.of(point).iter().map(|edge| &self.edges[*edge as usize])
     }
 
     #[inline]
     pub(super) fn corners(&self, at: &Moment<'_>, face: u32) -> [DVec3; 3] {
         let [a, b, c] = self.triangles[face as usize];
         [at.position(a), at.position(b), at.position(c)]
+    }
+
+    /// The point closest to `point` on some triangles.
+    pub(super) fn nearest(
+        &self,
+        at: &Moment<'_>,
+        faces: impl Iterator<Item = u32>,
+        point: DVec3,
+    ) -> Option<ClosestPoint> {
+        let each = faces.map(|face| ClosestPoint::on(face, point, self.corners(at, face)));
+        each.reduce(|best, next| if next.distance < best.distance { next } else { best })
     }
 
     /// Unit normal; `None` for a triangle without area.

@@ -78,7 +78,7 @@ pub(super) fn way_back(surface: &TriangleSurface, at: &Moment<'_>, face: u32, po
     is_behind(surface, at, &nearest, point).then_some(nearest)
 }
 
-/// Adds the contacts of a point on `path`, which has a position for each pose, with `faces`, ascending.
+/// The contacts of a point on `path`, which has a position for each pose, with `faces`, ascending.
 /// `closest_at_start` finds the closest triangle at the start, for a point that may start inside and has no triangle
 /// close to it. A point that went in through the triangle `entry` in an earlier step is kept out by what lies there.
 pub(super) fn hits(
@@ -87,9 +87,7 @@ pub(super) fn hits(
     (faces, entry): (&[u32], Option<u32>),
     closest_at_start: &dyn Fn() -> Option<ClosestPoint>,
     rules: &ContactRules,
-    out: &mut Vec<Hit>,
-) {
-    let first = out.len();
+) -> Vec<Hit> {
     let (surface, end) = (on.surface, path[path.len() - 1]);
     let plane = |face: u32, side: f64, shift: f64| {
         let Settled { nearest, normal } = surface.walk_to(&on.end(), face, end);
@@ -98,8 +96,7 @@ pub(super) fn hits(
         Some(Hit { face: nearest.face, weights: nearest.weights, normal, shift, clearance })
     };
     if let Some(back) = entry.and_then(|face| way_back(surface, &on.start(), face, path[0])) {
-        out.extend(plane(back.face, 1.0, (back.distance - PUSH * rules.gap).max(0.0)));
-        return;
+        return Vec::from_iter(plane(back.face, 1.0, (back.distance - PUSH * rules.gap).max(0.0)));
     }
     let mut met = (path.len() - 1) as f64;
     let mut through: Vec<(u32, f64)> = Vec::new();
@@ -117,15 +114,13 @@ pub(super) fn hits(
     }
     if surface.closed && rules.push {
         let start = on.start();
-        let each = near.iter().map(|face| ClosestPoint::on(*face, path[0], surface.corners(&start, *face)));
-        let nearest = each.reduce(|best, next| if next.distance < best.distance { next } else { best });
+        let nearest = surface.nearest(&start, near.iter().copied(), path[0]);
         let nearest = nearest.filter(|nearest| nearest.distance <= rules.reach).or_else(closest_at_start);
         if let Some(nearest) = nearest.filter(|nearest| is_behind(surface, &start, nearest, path[0])) {
-            out.extend(plane(nearest.face, 1.0, (nearest.distance - PUSH * rules.gap).max(0.0)));
-            return;
+            return Vec::from_iter(plane(nearest.face, 1.0, (nearest.distance - PUSH * rules.gap).max(0.0)));
         }
     }
-    out.extend(through.iter().filter_map(|(face, side)| plane(*face, *side, 0.0)));
+    let mut found: Vec<Hit> = through.iter().filter_map(|(face, side)| plane(*face, *side, 0.0)).collect();
     let at = on.moment(met);
     let here = point_at(path, met);
     for face in &near {
@@ -133,13 +128,13 @@ pub(super) fn hits(
         // The triangle it crosses at that time already is a contact.
         let least = if !through.is_empty() { 1e-6 * rules.reach } else { 0.0 };
         if nearest.distance <= rules.reach && nearest.distance >= least {
-            out.extend(close(surface, &at, &on.end(), nearest, here, end));
+            found.extend(close(on, &at, nearest, here, end));
         }
     }
-    if out.len() == first {
-        out.extend(passed_closely(path, on, &near, rules.reach));
+    if found.is_empty() {
+        found.extend(passed_closely(path, on, &near, rules.reach));
     }
-    merge(out, first);
+    merged(found)
 }
 
 /// The contact of a point that came close to some of the triangles `near` in between without crossing any: with the
@@ -147,8 +142,7 @@ pub(super) fn hits(
 fn passed_closely(path: &[DVec3], on: &MovingSurface<'_>, near: &[u32], reach: f64) -> Option<Hit> {
     let (surface, end) = (on.surface, path[path.len() - 1]);
     let passed = near.iter().filter(|face| approaches(path, on, **face, reach));
-    let each = passed.map(|face| ClosestPoint::on(*face, end, surface.corners(&on.end(), *face)));
-    let nearest = each.reduce(|best, next| if next.distance < best.distance { next } else { best })?;
+    let nearest = surface.nearest(&on.end(), passed.copied(), end)?;
     if surface.closed && is_behind(surface, &on.end(), &nearest, end) {
         return None;
     }
@@ -205,14 +199,8 @@ fn crossing(path: &[DVec3], on: &MovingSurface<'_>, face: u32, reach: f64) -> Ap
 
 /// The contact of a point at `here` with a triangle close to it, if no adjacent triangle is closer; given for the end
 /// of the motion.
-fn close(
-    surface: &TriangleSurface,
-    at: &Moment<'_>,
-    last: &Moment<'_>,
-    nearest: ClosestPoint,
-    here: DVec3,
-    end: DVec3,
-) -> Option<Hit> {
+fn close(on: &MovingSurface<'_>, at: &Moment<'_>, nearest: ClosestPoint, here: DVec3, end: DVec3) -> Option<Hit> {
+    let (surface, last) = (on.surface, &on.end());
     let away = here - nearest.point;
     if (surface.closed && is_behind(surface, at, &nearest, here)) || !surface.is_nearest_around(at, &nearest, &away) {
         return None;
@@ -268,20 +256,19 @@ fn approaches(path: &[DVec3], on: &MovingSurface<'_>, face: u32, reach: f64) -> 
     false
 }
 
-/// Of the contacts from `first` on, keeps the deepest of those with similar normals, and only a few in all, ordered by
-/// triangle.
-fn merge(hits: &mut Vec<Hit>, first: usize) {
+/// The deepest of contacts with similar normals, and only a few in all, ordered by triangle.
+fn merged(mut hits: Vec<Hit>) -> Vec<Hit> {
     /// Cosine of the angle within which normals are similar.
     const SAME: f64 = 0.99;
     /// Largest number of contacts of a point with one surface.
     const MOST: usize = 4;
-    let mut mine: Vec<Hit> = hits.drain(first..).collect();
-    mine.sort_by(|a, b| a.clearance.total_cmp(&b.clearance).then(a.face.cmp(&b.face)));
-    for hit in mine {
-        let kept = &hits[first..];
+    hits.sort_by(|a, b| a.clearance.total_cmp(&b.clearance).then(a.face.cmp(&b.face)));
+    let mut kept: Vec<Hit> = Vec::new();
+    for hit in hits {
         if kept.len() < MOST && kept.iter().all(|other| other.normal.dot(&hit.normal) < SAME) {
-            hits.push(hit);
+            kept.push(hit);
         }
     }
-    hits[first..].sort_by_key(|hit| hit.face);
+    kept.sort_by_key(|hit| hit.face);
+    kept
 }

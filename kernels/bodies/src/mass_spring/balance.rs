@@ -7,7 +7,7 @@ use super::contact::{ContactConstraint, ContactMode};
 use super::energy::Energies;
 use super::springs;
 use super::stage::Stage;
-use super::step::{Kinematics, Stepper};
+use super::step::{Interval, Kinematics, Stepper};
 use numerics::vector::DVec3;
 
 impl Stepper<'_> {
@@ -16,16 +16,15 @@ impl Stepper<'_> {
     pub(super) fn energy_lost(
         &mut self,
         [before, after]: [&Energies; 2],
-        start: &Kinematics,
+        step: Interval<'_>,
         motion: &Kinematics,
         contacts: &[ContactConstraint],
-        times: [f64; 2],
     ) -> f64 {
-        let h = (times[1] - times[0]) * self.seconds;
+        let Interval { start, times, h } = step;
         let (body, external) = (self.context.body, self.context.external);
         let moved = |particle: usize| motion.x[particle] - start.x[particle];
         let clusters = &body.order.clusters;
-        let given = clusters.sum((), |cluster, ()| {
+        let given: f64 = clusters.sum((), |cluster, ()| {
             let of = |particle: usize| {
                 let ends = [times[1], h];
                 external.work(particle, body.mass[particle], ends, motion.x[particle], moved(particle))
@@ -41,14 +40,13 @@ impl Stepper<'_> {
             let displacement: DVec3 = contact.sides().map(|(particle, weight)| moved(particle) * weight).sum();
             (state.force - normal).dot(&displacement) + normal.dot(&contact.velocity) * h
         });
-        let by_contacts =
-            by_contacts.sum::<f64>() + self.work_of_missing_forces(start, motion, contacts, [times[1], h]);
+        let by_contacts = by_contacts.sum::<f64>() + self.work_of_missing_forces(step, motion, contacts);
         let damped = after.dashed / h + self.solver.volumes.dissipated(h);
         let pins: Vec<usize> = external.moving_pins().collect();
         let mut by_pins = 0.0;
         if !pins.is_empty() {
-            let stage = Stage { a: h, time: times[1], contacts, ..Stage::default() };
-            let force = self.solver.forces(&self.context, &stage, &motion.x, &motion.v);
+            let stage = Stage { contacts, ..Stage::new(self.context, [&[], &[]], h, times[1]) };
+            let force = self.solver.forces(&stage, &motion.x, &motion.v);
             let reaction = |pin: usize| (motion.v[pin] - start.v[pin]) * (body.mass[pin] / h) - force[pin];
             by_pins = pins.into_iter().map(|pin| reaction(pin).dot(&moved(pin))).sum();
         }
@@ -56,14 +54,13 @@ impl Stepper<'_> {
         if lost.is_finite() { lost } else { 0.0 }
     }
 
-    /// Work of moving obstacles by what contact forces at the end of a step of `h` seconds at `time` lack of those that
+    /// Work of moving obstacles by what contact forces at the end of a step lack of those that
     /// changed the momentum of each piece, joules.
     fn work_of_missing_forces(
         &self,
-        start: &Kinematics,
+        Interval { start, times, h }: Interval<'_>,
         end: &Kinematics,
         contacts: &[ContactConstraint],
-        [time, h]: [f64; 2],
     ) -> f64 {
         let (body, external, layout) = (self.context.body, self.context.external, &self.solver.layout);
         // For each piece its missing force, and velocities of obstacles with the sum of their weights.
@@ -90,22 +87,22 @@ impl Stepper<'_> {
             for particle in particles {
                 let mass = body.mass[particle];
                 missing += (end.v[particle] - start.v[particle]) * (mass / h);
-                missing -= external.force(particle, mass, time, end.x[particle], end.v[particle]);
+                missing -= external.force(particle, mass, times[1], end.x[particle], end.v[particle]);
             }
             work += missing.dot(&velocity) * (h / sum);
         }
         work
     }
 
-    /// The largest error of the speed of a piece in contact by a step from `start` to `end`, a root mean square over its
+    /// The largest error of the speed of a piece in contact by a step that ends with `end`, a root mean square over its
     /// particles, relative to the speed that it would have if all its energy, with what its dashpots took, were kinetic.
     /// `errors` are those of positions. What is pinned does not bounce.
     pub(super) fn impact_error(
         &self,
-        [start, end]: [&Kinematics; 2],
+        Interval { start, h, .. }: Interval<'_>,
+        end: &Kinematics,
         contacts: &[ContactConstraint],
         errors: &[DVec3],
-        h: f64,
     ) -> f64 {
         /// Speeds below what gravity gives in this many frames are not resolved: what rests, or is rolled, does not bounce.
         const SLOW: f64 = 3.0;

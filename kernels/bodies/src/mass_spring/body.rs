@@ -251,11 +251,10 @@ impl SoftBody {
         }
         let ratio = |piece: &std::ops::Range<usize>| {
             let particles = self.particles(piece);
-            let mass: f64 = self.mass[particles.clone()].iter().sum();
             let along = self.rest[particles.clone()].iter().map(|x| gravity.dot(x));
             let (low, high) =
                 along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-            stiff[particles].iter().sum::<f64>() / (mass * (high - low))
+            stiff[particles.clone()].iter().sum::<f64>() / (self.mass_of(particles) * (high - low))
         };
         self.order.pieces.iter().map(ratio).fold(f64::INFINITY, f64::min)
     }
@@ -264,6 +263,17 @@ impl SoftBody {
     pub(super) fn particles(&self, piece: &std::ops::Range<usize>) -> std::ops::Range<usize> {
         let clusters = &self.order.clusters;
         clusters.range(piece.start).start..clusters.range(piece.end - 1).end
+    }
+
+    /// Mass of some particles, kilograms.
+    pub(super) fn mass_of(&self, particles: std::ops::Range<usize>) -> f64 {
+        self.mass[particles].iter().sum()
+    }
+
+    /// The mean of `values` over some particles, weighted by mass.
+    pub(super) fn mean_by_mass(&self, particles: std::ops::Range<usize>, values: &[DVec3]) -> DVec3 {
+        let each = particles.clone().map(|particle| values[particle] * self.mass[particle]);
+        each.sum::<DVec3>() / self.mass_of(particles)
     }
 
     /// Number of contact points: particles and points that ride along.
@@ -282,9 +292,9 @@ impl SoftBody {
         with_riding(particles, &self.riding)
     }
 
-    /// Permutes per-particle values from the caller's to the solver's order.
-    pub(super) fn to_solver_order<T: Copy>(&self, values: &[T]) -> Vec<T> {
-        self.order.caller_of.iter().map(|caller| values[*caller as usize]).collect()
+    /// Permutes vectors of particles from the caller's to the solver's order.
+    pub(super) fn to_solver_order(&self, values: &[[f64; 3]]) -> Vec<DVec3> {
+        self.order.caller_of.iter().map(|caller| values[*caller as usize].into()).collect()
     }
 
     /// Changes masses and stiffnesses; shape and state are kept.

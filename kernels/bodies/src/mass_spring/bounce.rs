@@ -5,9 +5,10 @@
 //! as a whole is slowed: what vibrates or rotates goes on. Two bodies are slowed by opposite impulses where they were in
 //! contact, so that momenta are conserved. Either takes energy, never adds any.
 
+use super::coarse::Layout;
 use super::contact::ContactConstraint;
 use super::predictor::RigidMotion;
-use super::step::{Kinematics, Stepper};
+use super::step::{Interval, Kinematics, Stepper};
 use numerics::vector::DVec3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -42,13 +43,9 @@ struct Touch {
 
 impl Touch {
     /// The closed ones of `contacts` at `x`, by pieces.
-    fn all(
-        contacts: &[ContactConstraint],
-        x: &[DVec3],
-        piece_of: impl Fn(usize) -> usize,
-    ) -> BTreeMap<[usize; 2], Self> {
-        let mut sums: BTreeMap<[usize; 2], [DVec3; 3]> = BTreeMap::new();
-        let mut weights: BTreeMap<[usize; 2], f64> = BTreeMap::new();
+    fn all(contacts: &[ContactConstraint], x: &[DVec3], layout: &Layout) -> BTreeMap<[usize; 2], Self> {
+        // Sums of normals, points, velocities, and of the depths that weigh them.
+        let mut sums: BTreeMap<[usize; 2], ([DVec3; 3], f64)> = BTreeMap::new();
         for contact in contacts {
             let depth = -contact.clearance(x, 0.0);
             if depth.is_nan() || depth <= 0.0 {
@@ -56,7 +53,8 @@ impl Touch {
             }
             let [first, second] = contact.surfaces().map(|particles| particles.first());
             let Some(first) = first else { continue };
-            let pieces = [piece_of(*first as usize), second.map_or(OBSTACLES, |second| piece_of(*second as usize))];
+            let piece_of = |particle: &u32| layout.piece_of(*particle as usize);
+            let pieces = [piece_of(first), second.map_or(OBSTACLES, piece_of)];
             if pieces[0] == pieces[1] {
                 continue;
             }
@@ -64,14 +62,14 @@ impl Touch {
             let key = if turned { [pieces[1], pieces[0]] } else { pieces };
             let of_first = contact.sides().take(contact.surfaces()[0].len());
             let point: DVec3 = of_first.map(|(particle, weight)| x[particle] * weight).sum();
-            let sum = sums.entry(key).or_default();
+            let (sum, weight) = sums.entry(key).or_default();
             sum[0] += contact.normal * if turned { -depth } else { depth };
             sum[1] += point * depth;
             sum[2] += contact.velocity * depth;
-            *weights.entry(key).or_default() += depth;
+            *weight += depth;
         }
-        let mean = |(key, [normal, point, velocity]): ([usize; 2], [DVec3; 3])| {
-            let (normal, weight) = (normal.try_normalize(0.0)?, weights[&key]);
+        let mean = |(key, ([normal, point, velocity], weight)): (_, ([DVec3; 3], f64))| {
+            let normal = normal.try_normalize(0.0)?;
             let touch =
                 Self { normal: normal.into(), point: (point / weight).into(), velocity: (velocity / weight).into() };
             (touch.point.iter().chain(&touch.velocity).all(|x| x.is_finite())).then_some((key, touch))
@@ -95,29 +93,27 @@ impl Touch {
 }
 
 impl Stepper<'_> {
-    /// Follows impacts through a step of `h` seconds from `start`, and slows what lost contact in it if it leaves faster than
+    /// Follows impacts through a step, and slows what lost contact in it if it leaves faster than
     /// `bounce` × its speed of approach. Returns the work that moving obstacles do by that, joules, if anything was slowed.
     pub(super) fn limit_bounce(
         &mut self,
         bounce: f64,
         contacts: &[ContactConstraint],
-        start: &Kinematics,
+        Interval { start, h, .. }: Interval<'_>,
         motion: &mut Kinematics,
-        h: f64,
     ) -> Option<f64> {
-        if contacts.is_empty() && self.impacts.is_empty() {
+        if contacts.is_empty() && motion.carried.impacts.is_empty() {
             return None;
         }
-        let layout = &self.solver.layout;
-        let mut now = Touch::all(contacts, &motion.x, |particle| layout.piece_of(particle));
-        let known = std::mem::take(self.impacts);
+        let mut now = Touch::all(contacts, &motion.x, &self.solver.layout);
+        let known = std::mem::take(&mut motion.carried.impacts);
         let mut work: Option<f64> = None;
         for mut impact in known {
             match now.remove(&impact.pieces) {
                 Some(touch) => {
                     (impact.touch, impact.apart) = (touch, 0.0);
                     impact.approach = impact.approach.max(self.approach(&touch, &impact.pieces, start));
-                    self.impacts.push(impact);
+                    motion.carried.impacts.push(impact);
                 }
                 None => {
                     let just = impact.apart == 0.0;
@@ -126,7 +122,7 @@ impl Stepper<'_> {
                     }
                     impact.apart += h;
                     if impact.apart <= self.seconds {
-                        self.impacts.push(impact);
+                        motion.carried.impacts.push(impact);
                     }
                 }
             }
@@ -134,9 +130,9 @@ impl Stepper<'_> {
         for (pieces, touch) in now {
             let approach = self.approach(&touch, &pieces, start).max(0.0);
             let leaving = touch.speed(&self.rigid(&pieces, start)).max(0.0);
-            self.impacts.push(Impact { pieces, approach, leaving, touch, apart: 0.0 });
+            motion.carried.impacts.push(Impact { pieces, approach, leaving, touch, apart: 0.0 });
         }
-        self.impacts.sort_unstable_by_key(|impact| impact.pieces);
+        motion.carried.impacts.sort_unstable_by_key(|impact| impact.pieces);
         work
     }
 
@@ -152,7 +148,7 @@ impl Stepper<'_> {
     fn rotating(&self, piece: usize, motion: &Kinematics) -> Option<RigidMotion> {
         let (body, held) = (self.context.body, &self.context.external.held);
         let piece = body.order.pieces.get(piece)?;
-        Some(RigidMotion::new(body, held, piece, &motion.x, &motion.v, &motion.v))
+        Some(RigidMotion::new(body, held, piece, [&motion.x, &motion.v, &motion.v]))
     }
 
     /// The speed at which pieces approach each other, as wholes or where they touch.

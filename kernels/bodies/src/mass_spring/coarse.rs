@@ -8,7 +8,7 @@ use super::body::SoftBody;
 use super::galerkin::envelope;
 use super::system::{System, solve_lower, solve_lower_transpose, times};
 use numerics::partition::Partition;
-use numerics::vector::{DMat3, DVec3, Vec3, to_f32};
+use numerics::vector::{DMat3, DVec3, Vec3, to_f32, to_f64};
 use serde::{Deserialize, Serialize};
 
 /// Rigid motions of a cluster: three translations, three rotations.
@@ -33,20 +33,18 @@ impl ContactFilters {
         /// Contact stiffness below this fraction of a particle's total stiffness is ignored.
         const NEGLIGIBLE: f64 = 0.1;
         let mut filters = Self::default();
-        if system.blocks.is_empty() && system.transient.is_empty() && system.isolated.is_empty() {
+        if system.blocks.is_empty() && system.transient.is_empty() && !system.isolated.contains(&true) {
             return filters;
         }
         // Terms that the coarse matrix leaves out anchor both their sides.
         let end = if envelope(layout, system).0 < system.transient.len() { usize::MAX } else { system.anchors };
         for particle in 0..system.inertia.len() {
-            if system.isolated.get(particle) == Some(&true) {
+            if system.isolated[particle] {
                 filters.insert(particle, system.inertia.len(), [[0.0; 3]; 3]);
                 continue;
             }
             let mut block = system.blocks.get(particle).copied().unwrap_or_default();
-            if !system.transient.is_empty() {
-                system.transient.add_block(particle, 1.0, end, &mut block);
-            }
+            system.transient.add_block(particle, 1.0, end, &mut block);
             if system.held[particle] || block.iter().all(|x| *x == 0.0) {
                 continue;
             }
@@ -107,14 +105,14 @@ pub(super) struct Layout {
 impl Layout {
     pub(super) fn new(body: &SoftBody) -> Self {
         let order = &body.order;
-        let mut layout = Self { first: (0..order.clusters.len() as u32).collect(), ..Self::default() };
+        let mut layout = Self::default();
         for cluster in 0..order.clusters.len() {
             layout.cluster.extend(order.clusters.range(cluster).map(|_| cluster as u32));
         }
         for (index, clusters) in order.pieces.iter().enumerate() {
             layout.piece.extend(clusters.clone().map(|_| index as u32));
         }
-        let mut first = std::mem::take(&mut layout.first);
+        let mut first: Vec<u32> = (0..order.clusters.len() as u32).collect();
         for particle in 0..body.len() {
             let [_, across] = body.adjacency.of(particle, &body.adjacency.incident);
             across.iter().for_each(|incident| layout.join(&mut first, &[particle as u32, incident.other]));
@@ -160,8 +158,28 @@ pub(super) fn offset_from_centroid(clusters: &Partition, x: &[DVec3], offset_fro
     });
 }
 
-/// Displacement at `offset` by a rigid motion.
-#[inline(always)]
-pub(super) fn moved(modes: &[f64], offset: DVec3) -> DVec3 {
-    DVec3::new(modes[0], modes[1], modes[2]) + DVec3::new(modes[3], modes[4], modes[5]).cross(&offset)
+/// Rigid motions of clusters, as particles follow them.
+#[derive(Clone, Copy)]
+pub(super) struct ClusterMotions<'a> {
+    pub(super) offset_from_centroid: &'a [Vec3],
+    pub(super) filters: &'a ContactFilters,
+}
+
+impl ClusterMotions<'_> {
+    /// Displacement of a particle along `direction` by each rigid motion of its cluster; the force and torque on the cluster
+    /// by a force on it.
+    #[inline(always)]
+    pub(super) fn along(&self, particle: usize, direction: DVec3) -> [f64; MODES] {
+        let direction = self.filters.at(particle).map_or(direction, |filter| filter.tr_mul(&direction));
+        let turned = to_f64(self.offset_from_centroid[particle]).cross(&direction);
+        [direction.x, direction.y, direction.z, turned.x, turned.y, turned.z]
+    }
+
+    /// Displacement of a particle by the rigid motion `modes` of its cluster.
+    #[inline(always)]
+    pub(super) fn moved(&self, modes: &[f64], particle: usize) -> DVec3 {
+        let turn = DVec3::new(modes[3], modes[4], modes[5]);
+        let free = DVec3::new(modes[0], modes[1], modes[2]) + turn.cross(&to_f64(self.offset_from_centroid[particle]));
+        self.filters.at(particle).map_or(free, |filter| filter * free)
+    }
 }

@@ -10,6 +10,7 @@
 
 use super::body::SoftBody;
 use super::volume::continued;
+use crate::embedding::EmbeddedPoint;
 use numerics::vector::DVec3;
 
 /// Penalty stiffness κ ÷ effective stiffness of the particles, springs and inertia together. Larger values keep the
@@ -151,6 +152,12 @@ pub(super) struct ContactState {
     grip: f64,
     slip: DVec3,
     pub(super) energy: f64,
+    /// Friction dual: the predicted friction relative to its bound.
+    dual: DVec3,
+    /// Predicted normal force, newtons, and the difference of the one around which the contact was linearised from the current
+    /// one.
+    pub(super) predicted: f64,
+    pub(super) offset: f64,
 }
 
 impl ContactConstraint {
@@ -188,35 +195,23 @@ impl ContactConstraint {
 
     /// Adds a contact point of the caller's: a particle, or the particles that it rides along on.
     fn add_point(&mut self, body: &SoftBody, k: usize, point: usize) -> Option<()> {
-        let weight = self.point_weights[k];
-        match body.order.index_of.get(point) {
-            Some(particle) => {
-                self.points[k] = *particle;
-                self.add_side(*particle, weight);
-            }
-            None => {
-                self.points[k] = point as u32;
-                let carrier = body.riding.get(point - body.len())?;
-                for (particle, share) in carrier.sides() {
-                    self.add_side(body.order.index_of[particle as usize], weight * share);
-                }
-            }
+        let (of_particle, weight) = (body.order.index_of.get(point), self.point_weights[k]);
+        let carrier = match of_particle {
+            Some(_) => EmbeddedPoint::at_particle(point as u32),
+            None => *body.riding.get(point - body.len())?,
+        };
+        self.points[k] = of_particle.copied().unwrap_or(point as u32);
+        for (particle, share) in carrier.sides() {
+            let (particle, count) = (body.order.index_of[particle as usize], self.counts[0]);
+            let known = self.particles[..count].iter().position(|known| *known == particle).unwrap_or(count);
+            self.particles[known] = particle;
+            self.weights[known] += weight * share;
+            self.counts[0] = count.max(known + 1);
         }
         if weight > 0.0 {
             self.counts[1] = self.counts[0];
         }
         Some(())
-    }
-
-    fn add_side(&mut self, particle: u32, weight: f64) {
-        let count = &mut self.counts[0];
-        match self.particles[..*count].iter().position(|known| *known == particle) {
-            Some(known) => self.weights[known] += weight,
-            None => {
-                (self.particles[*count], self.weights[*count]) = (particle, weight);
-                *count += 1;
-            }
-        }
     }
 
     /// The particles with their weights.
@@ -339,6 +334,12 @@ impl ContactConstraint {
         relative - self.normal * self.normal.dot(&relative)
     }
 
+    /// Updates a state, which keeps its predictions, as [`Self::at`].
+    pub(super) fn update(&self, state: &mut ContactState, [x, v]: [&[DVec3]; 2], seconds: f64, size: f64) {
+        let ContactState { dual, predicted, .. } = *state;
+        *state = ContactState { dual, predicted, ..self.at(x, v, seconds, size) };
+    }
+
     /// The forces at `x` and `v`, `seconds` before the detection time, for a body of the given `size`.
     pub(super) fn at(&self, x: &[DVec3], v: &[DVec3], seconds: f64, size: f64) -> ContactState {
         let depth = self.depth(x, seconds);
@@ -364,13 +365,18 @@ impl ContactConstraint {
         let most = self.friction * self.load;
         if most > 0.0 {
             let slip = self.slip(v);
-            let (speed, creep) = (slip.norm(), creep(size).max(most / self.stick_limit));
+            let (speed, creep) = (slip.norm(), self.creep(size));
             state.mode = if speed <= creep { ContactMode::Sticking } else { ContactMode::Sliding };
             state.grip = most / speed.max(creep);
             state.slip = slip / speed.max(creep);
             state.force -= slip * state.grip;
         }
         state
+    }
+
+    /// The state before the first linear system, which expects the last load.
+    pub(super) fn unsolved(&self) -> ContactState {
+        ContactState { predicted: self.load, ..ContactState::default() }
     }
 
     /// Fixes the normal load of friction: the force at `x`, `seconds` before the detection time, but no more than the
@@ -381,7 +387,7 @@ impl ContactConstraint {
         let near = self.velocity.norm() * seconds <= self.gap;
         let last = self.points().map(|(point, _)| loads[point]).fold(0.0, f64::max);
         let now = if near {
-            self.load_at_depth(self.depth(x, seconds))
+            self.load_at(x, seconds)
         } else if self.is_of_one_point() {
             last
         } else {
@@ -390,12 +396,9 @@ impl ContactConstraint {
         Self { load: now.min(last), ..*self }
     }
 
-    /// The normal force at `x`, as a load for friction.
-    pub(super) fn load_at(&self, x: &[DVec3]) -> f64 {
-        self.load_at_depth(self.depth(x, 0.0))
-    }
-
-    fn load_at_depth(&self, depth: f64) -> f64 {
+    /// The normal force at `x`, `seconds` before the detection time, as a load for friction.
+    pub(super) fn load_at(&self, x: &[DVec3], seconds: f64) -> f64 {
+        let depth = self.depth(x, seconds);
         // Where the surfaces penetrate each other, the force only separates them and causes no friction.
         if depth <= 0.0 || self.gap_fraction(depth + self.allowed_depth) > 1.0 {
             return 0.0;
@@ -420,44 +423,63 @@ impl ContactConstraint {
 
     /// Linearises the normal force at a predicted value instead of the current one, if that is smaller. Far into the
     /// steep part of the penalty, Newton's method would only halve the excess in each iteration.
-    pub(super) fn linearise_at(&self, state: &mut ContactState, expected: f64) {
+    pub(super) fn linearise(&self, state: &mut ContactState) {
+        let expected = state.predicted;
         if self.frozen.is_some() || state.depth <= 0.0 || self.gap <= 0.0 || expected >= state.normal_force {
             return;
         }
         let left = self.penalty_stiffness / (self.penalty_stiffness + expected / self.gap);
         let slope = self.penalty_stiffness / (left * left);
         let push = expected + slope * (state.depth - self.gap * (1.0 - left));
-        (state.normal_force, state.slope) = (push, slope);
+        (state.offset, state.normal_force, state.slope) = (push - state.normal_force, push, slope);
     }
 
-    /// Normal force predicted by the linearisation after a fraction `share` of the step `dx`.
-    pub(super) fn predicted_force(&self, state: &ContactState, dx: &[DVec3], share: f64) -> f64 {
-        if state.depth <= 0.0 {
-            return 0.0;
+    /// Predicts the normal force and the friction dual after a fraction `share` of the step `dx` in a stage of `a`, as
+    /// linearised. The dual has length 1 at most; it is zero where the step was cut because it would have reversed the slip.
+    pub(super) fn predict(&self, state: &mut ContactState, dx: &[DVec3], share: f64, a: f64) {
+        let separation = self.weighted_sum(dx);
+        let along = self.normal.dot(&separation);
+        let force = (state.normal_force - state.slope * share * along).max(0.0);
+        state.predicted = if state.depth > 0.0 { force } else { 0.0 };
+        let (before, most) = (std::mem::take(&mut state.dual), self.friction * self.load);
+        if most <= 0.0 || state.mode == ContactMode::Open {
+            return;
         }
-        (state.normal_force - state.slope * share * self.normal.dot(&self.weighted_sum(dx))).max(0.0)
+        let more = (separation - self.normal * along) * (state.grip / (a * most));
+        let slides = state.mode == ContactMode::Sliding;
+        if slides && share < 1.0 && state.slip.dot(&(state.slip + more)) < 0.0 {
+            return;
+        }
+        let turned = if slides { more - before * state.slip.dot(&more) } else { more };
+        let next = before.lerp(&(state.slip + turned), share);
+        state.dual = next * (DUAL_SHRINK / next.norm().max(1.0));
+    }
+
+    /// Slip velocity above which friction is μN, m/s.
+    fn creep(&self, size: f64) -> f64 {
+        (CREEP * size).max(f64::MIN_POSITIVE).max(self.friction * self.load / self.stick_limit)
     }
 
     /// Friction potential of the stage in which `v` = (x − z)/a.
     pub(super) fn friction_energy(&self, v: &[DVec3], a: f64, size: f64) -> f64 {
         let most = self.friction * self.load;
-        let (speed, creep) = (self.slip(v).norm(), creep(size).max(most / self.stick_limit));
+        let (speed, creep) = (self.slip(v).norm(), self.creep(size));
         let held = if speed <= creep { 0.5 * speed * speed / creep } else { speed - 0.5 * creep };
         a * most * held
     }
 
     /// Up to three directions in which the contact has stiffness in a stage of `a`, each scaled by the square root of
-    /// that stiffness, and their number.
+    /// that stiffness.
     ///
     /// The derivative of sliding friction vanishes along the slip, so plain Newton iterations would oscillate. The
     /// linearisation is the primal-dual one of Chan, Golub & Mulet (1999): with a dual of 0 it is that of slower
     /// surfaces, which never overshoots; with the dual that matches the slip it is exact.
-    pub(super) fn stiffness_directions(&self, state: &ContactState, a: f64, dual: &DVec3) -> ([DVec3; 3], usize) {
-        let n = self.normal;
+    pub(super) fn stiffness_directions(&self, state: &ContactState, a: f64) -> impl Iterator<Item = DVec3> {
+        let (n, dual) = (self.normal, state.dual);
         let mut out = [n * (a * a * state.slope).max(0.0).sqrt(), DVec3::zeros(), DVec3::zeros()];
         let (along, [least, most]) = match state.mode {
-            ContactMode::Open => return (out, 0),
-            ContactMode::Frictionless => return (out, 1),
+            ContactMode::Open => return out.into_iter().take(0),
+            ContactMode::Frictionless => return out.into_iter().take(1),
             ContactMode::Sticking => (DVec3::zeros(), [1.0, 1.0]),
             ContactMode::Sliding => {
                 let (length, common) = (dual.norm(), dual.dot(&state.slip));
@@ -469,29 +491,6 @@ impl ContactConstraint {
         let along = along.try_normalize(OPPOSITE).unwrap_or_else(any);
         out[1] = along * (a * state.grip * least).max(0.0).sqrt();
         out[2] = n.cross(&along) * (a * state.grip * most).max(0.0).sqrt();
-        (out, 3)
+        out.into_iter().take(3)
     }
-
-    /// The friction dual, of length 1 at most, after a fraction `share` of the step `dx` in a stage of `a`, as
-    /// linearised with the current `dual`. Zero where the step was cut because it would have reversed the slip.
-    pub(super) fn next_dual(&self, state: &ContactState, dual: &DVec3, dx: &[DVec3], share: f64, a: f64) -> DVec3 {
-        let most = self.friction * self.load;
-        if most <= 0.0 || state.mode == ContactMode::Open {
-            return DVec3::zeros();
-        }
-        let separation = self.weighted_sum(dx);
-        let more = (separation - self.normal * self.normal.dot(&separation)) * (state.grip / (a * most));
-        let slides = state.mode == ContactMode::Sliding;
-        if slides && share < 1.0 && state.slip.dot(&(state.slip + more)) < 0.0 {
-            return DVec3::zeros();
-        }
-        let turned = if slides { more - dual * state.slip.dot(&more) } else { more };
-        let next = dual.lerp(&(state.slip + turned), share);
-        next * (DUAL_SHRINK / next.norm().max(1.0))
-    }
-}
-
-/// Slip velocity above which friction is μN, m/s.
-fn creep(size: f64) -> f64 {
-    (CREEP * size).max(f64::MIN_POSITIVE)
 }

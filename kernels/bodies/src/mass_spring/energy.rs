@@ -2,8 +2,7 @@
 
 use super::springs;
 use super::stage::{FrameContext, StageSolver};
-use super::step::Kinematics;
-use numerics::vector::DVec3;
+use numerics::vector::{DVec2, DVec3};
 
 /// Energies, joules.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -38,40 +37,34 @@ pub(super) fn measure(
     solver: &mut StageSolver,
     context: &FrameContext<'_>,
     time: f64,
-    motion: &Kinematics,
+    [x, v]: [&[DVec3]; 2],
     looked: bool,
 ) -> Energies {
-    let (body, x, v) = (context.body, &motion.x, &motion.v);
+    let body = context.body;
     if !looked {
         solver.volumes.measure(body, x);
     }
-    let watched = &solver.inventory.watched;
-    let thin: f64 = solver.volumes.thin_tets(body, x, context.volumes, watched).iter().map(|thin| thin.energy).sum();
-    let stored = solver.volumes.stored;
+    let [stored, thin] = solver.volumes.energy(context, x, &solver.inventory.watched);
     let (rest, before, now) = (&context.rest, &solver.lengths, &mut solver.lengths_now);
     now.resize(body.ends.len(), 0.0);
-    let springs = body.spring_partition.map(&mut now[..], |part, now: &mut [f64]| {
+    let springs = body.spring_partition.sum(&mut now[..], |part, now: &mut [f64]| {
         let range = body.spring_partition.range(part);
-        range.zip(now).filter(|(at, _)| rest.is_intact(*at as u32)).fold([0.0; 2], |[stored, dashed], (at, now)| {
+        range.zip(now).filter(|(at, _)| rest.is_intact(*at as u32)).fold(DVec2::zeros(), |sum, (at, now)| {
             *now = springs::spring_length(body, x, at);
             let change = *now - before.get(at).copied().unwrap_or(*now);
-            [stored + springs::stored(body, rest, at, *now), dashed + body.damping[at] * change * change]
+            sum + DVec2::new(springs::stored(body, rest, at, *now), body.damping[at] * change * change)
         })
     });
-    let [springs, dashed] = springs.into_iter().fold([0.0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
     let clusters = &body.order.clusters;
-    let own = clusters.map((), |cluster, ()| {
-        clusters.range(cluster).fold([0.0; 3], |[kinetic, goals, height], particle| {
+    let own = clusters.sum((), |cluster, ()| {
+        clusters.range(cluster).fold(DVec3::zeros(), |sum, particle| {
             let mass = body.mass[particle];
-            [
-                kinetic + 0.5 * mass * v[particle].norm_squared(),
-                goals + mass * context.external.goal_energy(particle, time, x[particle]),
-                height - mass * context.external.gravity.dot(&x[particle]),
-            ]
+            let goals = mass * context.external.goal_energy(particle, time, x[particle]);
+            let height = -(mass * context.external.gravity.dot(&x[particle]));
+            sum + DVec3::new(0.5 * mass * v[particle].norm_squared(), goals, height)
         })
     });
-    let [kinetic, goals, height] =
-        own.into_iter().fold([0.0; 3], |sum, part| [sum[0] + part[0], sum[1] + part[1], sum[2] + part[2]]);
+    let ([springs, dashed], [kinetic, goals, height]): ([f64; 2], [f64; 3]) = (springs.into(), own.into());
     Energies { kinetic, springs, volumes: stored + thin, goals, height, dashed }
 }
 

@@ -4,23 +4,20 @@
 //! they agree (see [`super::friction`]). The result satisfies Coulomb's law for its own normal forces.
 
 use super::contact::{Contact, ContactConstraint, ContactQuery};
-use super::search::StopCriteria;
 use super::springs::distance;
 use super::stage::{Solved, Stage};
-use super::step::{Kinematics, Stepper, deepest, sum};
+use super::step::{Interval, StepEnd, Stepper, deepest, sum};
 use numerics::vector::DVec3;
 
 /// Rounds of contact detection in a step.
 const MOST_ROUNDS: u32 = 4;
 /// Largest initial displacement of a particle onto a surface, as a fraction of the mean spring length.
 const MOST_NUDGE: f64 = 0.3;
-/// Residual ÷ initial residual at which implicit Euler stops.
-const EULER_SHARE: f64 = 0.05;
 
 impl Stepper<'_> {
-    /// Potential contacts of a motion from `start` to `to`, with their loads at the start.
-    pub(super) fn contacts(&self, start: &Kinematics, to: &[DVec3], times: [f64; 2]) -> Vec<ContactConstraint> {
-        let h = (times[1] - times[0]) * self.seconds;
+    /// Potential contacts of a step in which particles move to `to`, with their loads at the start.
+    pub(super) fn contacts(&self, step: Interval<'_>, to: &[DVec3]) -> Vec<ContactConstraint> {
+        let Interval { start, times, h } = step;
         let Some(contacts) = self.frame.contacts else { return Vec::new() };
         let body = self.context.body;
         let mut found: Vec<Contact> = Vec::new();
@@ -56,46 +53,33 @@ impl Stepper<'_> {
     pub(super) fn find_missed(
         &self,
         known: &[ContactConstraint],
-        start: &Kinematics,
+        step: Interval<'_>,
         x: &[DVec3],
-        times: [f64; 2],
     ) -> (Vec<ContactConstraint>, bool) {
-        if self.frame.contacts.is_none() {
-            return (Vec::new(), false);
-        }
         let deep = |contacts: &[ContactConstraint]| contacts.iter().filter(|contact| contact.is_too_deep(x)).count();
-        let found = self.contacts(start, x, times);
+        let found = self.contacts(step, x);
         let missed = deep(&found) > deep(known);
         (found, missed)
     }
 
-    /// A step of implicit Euler; `damped` if it starts out of balance by more than its contacts. Returns the estimated
-    /// errors of positions too.
-    pub(super) fn euler(
-        &mut self,
-        motion: &mut Kinematics,
-        times: [f64; 2],
-        contacts: &mut Vec<ContactConstraint>,
-        damped: bool,
-    ) -> (Solved, Vec<DVec3>) {
-        let h = (times[1] - times[0]) * self.seconds;
-        let mut z = motion.x.clone();
-        let y: Vec<DVec3> = motion.x.iter().zip(&motion.v).map(|(x, v)| x + v * h).collect();
-        let mut x = if damped { motion.x.clone() } else { self.slid(&motion.x, &y, contacts, h) };
-        self.pin(&mut x, &mut z, times[1], h);
+    /// A step of implicit Euler; `damped` if it starts out of balance by more than its contacts.
+    pub(super) fn euler(&mut self, step: Interval<'_>, contacts: &mut Vec<ContactConstraint>, damped: bool) -> StepEnd {
+        let Interval { start, times, h } = step;
+        let mut z = start.x.clone();
+        let y: Vec<DVec3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
+        let mut x = if damped { start.x.clone() } else { self.slid(&start.x, &y, contacts, h) };
+        self.context.external.hold(times[1], &mut x, &mut z, h);
         let volumes = self.solver.volumes.at(self.context.body, &z);
         self.solver.set_step_start(&self.context, h, |first, second| distance(&z, first, second), volumes);
-        let scale = self.scale(&motion.x, &y, contacts, h);
-        let mut enough = StopCriteria { share: EULER_SHARE, scale, square: 0.0, first: 0.0 };
+        let scale = self.scale(&start.x, &y, contacts, h);
         let mut solved = Solved::default();
-        let stage = Stage { y: &y, z: &z, a: h, time: times[1], line_search: true, ..Stage::default() };
+        let stage = Stage::new(self.context, [&y, &z], h, times[1]);
         for round in 1..=MOST_ROUNDS {
-            let again = self.solver.descend(&self.context, &stage, contacts, enough, self.cached, &mut x);
+            let again = self.solver.descend(&stage, contacts, scale, &solved, &mut x);
             solved = Solved { residual: again.residual, ..sum(solved, again) };
-            (enough.square, enough.first) = (solved.enough, solved.first);
-            let (mut found, missed) = self.find_missed(contacts, motion, &x, times);
+            let (mut found, missed) = self.find_missed(contacts, step, &x);
             // Contacts that were deep before are being separated.
-            let sank = |c: &&ContactConstraint| c.is_too_deep(&x) && c.clearance(&x, 0.0) < c.clearance(&motion.x, h);
+            let sank = |c: &&ContactConstraint| c.is_too_deep(&x) && c.clearance(&x, 0.0) < c.clearance(&start.x, h);
             solved.unmet = found.iter().filter(sank).map(|c| -c.clearance(&x, 0.0)).fold(0.0, f64::max);
             solved.deepest = deepest(&found, &x);
             if round == MOST_ROUNDS || !missed {
@@ -106,9 +90,8 @@ impl Stepper<'_> {
         }
         let v: Vec<DVec3> = x.iter().zip(&z).map(|(x, z)| (x - z) / h).collect();
         // First-order estimate: the change of velocity acts a whole step late.
-        let errors = v.iter().zip(&motion.v).map(|(v, before)| (v - before) * (0.5 * h)).collect();
-        (motion.x, motion.v) = (x, v);
-        (solved, errors)
+        let errors = v.iter().zip(&start.v).map(|(v, before)| (v - before) * (0.5 * h)).collect();
+        StepEnd { x, v, errors, solved }
     }
 
     /// Estimate of the squared residual of free motion from `x` to `y` plus gravity and obstacle motion in `h`.

@@ -3,6 +3,7 @@
 //! All are evaluated at the time of each stage; goals and pins move linearly through the frame.
 
 use super::body::SoftBody;
+use super::frame::SolverFrame;
 use numerics::vector::DVec3;
 
 /// Pulls a particle to a target: a spring of `strength`·mass N/m with a parallel dashpot.
@@ -49,17 +50,11 @@ struct Track {
 }
 
 impl ExternalForces {
-    pub(super) fn new(
-        body: &SoftBody,
-        gravity: DVec3,
-        drag: f64,
-        seconds: f64,
-        goals: &[GoalSpring],
-        pins: &[Pin],
-    ) -> Self {
+    pub(super) fn new(body: &SoftBody, frame: &SolverFrame<'_>, seconds: f64) -> Self {
+        let SolverFrame { goals, pins, .. } = *frame;
         let mut external = Self {
-            gravity,
-            drag,
+            gravity: frame.gravity.into(),
+            drag: frame.drag.max(0.0),
             seconds,
             goals: if goals.is_empty() { Vec::new() } else { vec![None; body.len()] },
             held: vec![false; body.len()],

@@ -9,7 +9,6 @@ use super::stage::{FrameContext, StageSolver};
 use super::state::State;
 use super::step::{Kinematics, Stepped, Stepper};
 use super::volume::{Inventory, Volumes};
-use numerics::vector::DVec3;
 
 /// Largest number of steps in a frame, and of parts into which a step is cut at once.
 const MOST_STEPS: u32 = 256;
@@ -165,33 +164,28 @@ impl BodySolver {
 
     fn step_here(&mut self, body: &SoftBody, state: &mut State, frame: &SolverFrame<'_>) -> FrameReport {
         let seconds = if frame.seconds.is_finite() { frame.seconds.max(0.0) } else { 0.0 };
-        let gravity = DVec3::from(frame.gravity);
-        let external = ExternalForces::new(body, gravity, frame.drag.max(0.0), seconds, frame.goals, frame.pins);
+        let external = ExternalForces::new(body, frame, seconds);
         let lengths = state.rest_lengths();
         let rest = RestLengths { lengths: &lengths, torn: &state.torn };
         self.solver.volumes = Volumes::new(body, frame.volume, &state.volumes);
         self.solver.system.regions.idle = self.solver.volumes.is_disabled();
         springs::particle_stiffness(body, &rest, &mut self.solver.particle_stiffness);
-        self.solver.system.set_isolated(&self.solver.particle_stiffness);
+        self.solver.system.set_loose(&external.held, &self.solver.particle_stiffness);
         let context =
             FrameContext { body, external: &external, rest, volumes: &state.volumes, cancelled: frame.cancelled };
-        let vectors =
-            |values: &[[f64; 3]]| body.to_solver_order(values).into_iter().map(DVec3::from).collect::<Vec<_>>();
-        let acceleration = if state.acceleration.len() == body.len() {
-            vectors(&state.acceleration)
-        } else {
-            vec![DVec3::zeros(); body.len()]
-        };
+        state.acceleration.resize(body.len(), [0.0; 3]);
+        let acceleration = body.to_solver_order(&state.acceleration);
         let mut loads = vec![0.0; body.contact_point_count()];
         for (point, load) in body.contact_indices().zip(&state.loads) {
             loads[point] = *load;
         }
-        let mut motion =
-            Kinematics { x: vectors(&state.positions), v: vectors(&state.velocities), acceleration, loads };
+        let (x, v) = (body.to_solver_order(&state.positions), body.to_solver_order(&state.velocities));
+        let mut motion = Kinematics { x, v, acceleration, loads, carried: std::mem::take(&mut state.carried) };
         self.solver.inventory = Inventory::new(body, &motion.x, &state.volumes);
         self.solver.lengths.clear();
-        let before = measure(&mut self.solver, &context, 0.0, &motion, false);
+        let before = measure(&mut self.solver, &context, 0.0, [&motion.x, &motion.v], false);
         self.solver.lengths.clone_from(&self.solver.lengths_now);
+        self.solver.cached = std::mem::take(&mut state.cached);
         let mut stepper = Stepper {
             solver: &mut self.solver,
             context,
@@ -201,10 +195,6 @@ impl BodySolver {
                 Integrator::Accurate { tolerance } => Some(tolerance.max(1e-12) * body.size),
                 Integrator::Default | Integrator::Euler => None,
             },
-            cached: &mut state.cached,
-            euler_steps_left: &mut state.euler_steps_left,
-            energy_budget: &mut state.energy_budget,
-            impacts: &mut state.impacts,
             energies: before,
             report: FrameReport::default(),
         };
@@ -216,8 +206,8 @@ impl BodySolver {
         (report.kinetic, report.elastic) = (after.kinetic, after.springs);
         (report.volume_energy, report.goal_energy) = (after.volumes, after.goals);
         report.worst_stretch = worst_stretch(&context, &motion.x);
-        report.lost_share = lost_share(report.energy_lost, [&before, &after], body, gravity.norm() * seconds);
-        state.acceleration.resize(body.len(), [0.0; 3]);
+        report.lost_share = lost_share(report.energy_lost, [&before, &after], body, external.gravity.norm() * seconds);
+        (state.cached, state.carried) = (std::mem::take(&mut self.solver.cached), motion.carried);
         state.loads.clear();
         state.loads.extend(body.contact_indices().map(|point| motion.loads[point]));
         for (caller, particle) in body.order.index_of.iter().enumerate() {
@@ -249,8 +239,8 @@ impl Stepper<'_> {
         /// Newton iterations of a frame after which steps are accepted, so that the frame ends; by default, and with a
         /// tolerance.
         const MOST_NEWTON: [u32; 2] = [400, 4000];
-        let (start, turned) = (self.start(motion), self.solver.inventory.inverted > 0);
-        let stepped = self.step(motion, times);
+        let turned = self.solver.inventory.inverted > 0;
+        let (end, stepped) = self.step(motion, times);
         self.report.newton += stepped.solved.newton;
         self.report.cg += stepped.solved.cg;
         let (share, unmet) = (times[1] - times[0], stepped.solved.unmet);
@@ -268,9 +258,10 @@ impl Stepper<'_> {
         if self.frame.substeps > 0 || (self.frame.cancelled)() || is_over || parts < 2 {
             self.report.uncut_impacts += u32::from(wanted > 1 && !shortest);
             self.report.tolerance_missed += u32::from(stepped.estimate > allowed);
+            *motion = end;
             return self.accept(&stepped);
         }
-        self.restart(start, motion);
+        self.refresh_inventory(&motion.x);
         let parts = parts.min((share * f64::from(MOST_STEPS)) as u32).max(2);
         let deepest = if unmet > 0.0 { unmet } else { deepest };
         self.advance_in(parts, motion, times, deepest);

@@ -8,7 +8,7 @@
 
 use super::contact::ContactConstraint;
 use super::predictor::RigidMotion;
-use super::stage::{FrameContext, Stage, StageSolver};
+use super::stage::{Stage, StageSolver};
 use numerics::vector::DVec3;
 
 /// Force and torque left on a body, and change of the sum of its loads, that are tolerated, relative to that sum. They
@@ -61,11 +61,11 @@ struct PieceLoads {
 
 impl StageSolver {
     /// The balance of loads at `x`, for which the residual was just evaluated. Pinned pieces are in balance.
-    pub(super) fn balance(&self, context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3]) -> LoadBalance {
-        let body = context.body;
+    pub(super) fn balance(&self, stage: &Stage<'_>, x: &[DVec3]) -> LoadBalance {
+        let body = stage.context.body;
         let mut pieces = vec![PieceLoads::default(); body.order.pieces.len()];
         for contact in stage.contacts.iter().filter(|contact| contact.friction > 0.0) {
-            let now = contact.load_at(x);
+            let now = contact.load_at(x, 0.0);
             let mut last = usize::MAX;
             for (particle, weight) in contact.sides() {
                 let piece = self.layout.piece_of(particle);
@@ -88,7 +88,7 @@ impl StageSolver {
             body.order.pieces.iter().zip(&pieces).filter(|piece| piece.1.single > 0.0 || piece.1.sum > 0.0)
         {
             let pressed = 1.0 + (PRESSED - 1.0) * (1.0 - (loads.net.norm() / loads.sum).min(1.0));
-            let left = RigidMotion::new(body, &self.system.held, piece, x, &left, &left).force(body);
+            let left = RigidMotion::new(body, &self.system.held, piece, [x, &left, &left]).force(body);
             let left = if loads.sum > 0.0 { left / (loads.sum * pressed) } else { 0.0 };
             balance.left = balance.left.max(left);
             balance.change = balance.change.max(loads.change.abs() / (loads.sum * pressed));
@@ -103,7 +103,7 @@ impl StageSolver {
     pub(super) fn reload(&self, contacts: &mut [ContactConstraint], x: &[DVec3], a: f64, size: f64) -> f64 {
         let more = contacts.iter_mut().map(|contact| {
             let before = contact.friction_energy(&self.v, a, size);
-            let now = contact.load_at(x);
+            let now = contact.load_at(x, 0.0);
             contact.load = if now > 0.0 { 0.5 * (contact.load + now) } else { 0.0 };
             contact.friction_energy(&self.v, a, size) - before
         });

@@ -1,13 +1,13 @@
 //! The coarse (Galerkin) matrix PᵀAP, where P maps rigid motions of clusters to particles.
 
 use super::body::SoftBody;
-use super::coarse::{ContactFilters, Layout, MODES};
+use super::coarse::{ClusterMotions, Layout, MODES};
 use super::springs::Record;
 use super::system::System;
 use numerics::cholesky::EnvelopeMatrix;
 use numerics::partition::Partition;
 use numerics::rank_one::{RankOneTerms, add_square};
-use numerics::vector::{DMat3, DVec3, Vec3, to_f64};
+use numerics::vector::{DMat3, DVec3, to_f64};
 
 /// Contacts between bodies are left out where they make factoring more than this many times as dear.
 const DEARER: f64 = 8.0;
@@ -21,9 +21,7 @@ pub(super) struct Galerkin<'a> {
     pub(super) layout: &'a Layout,
     pub(super) body: &'a SoftBody,
     pub(super) system: &'a System,
-    pub(super) offset_from_centroid: &'a [Vec3],
-    /// Filters of the rigid motions at particles in contact.
-    pub(super) filters: &'a ContactFilters,
+    pub(super) motions: ClusterMotions<'a>,
 }
 
 impl Galerkin<'_> {
@@ -45,7 +43,8 @@ impl Galerkin<'_> {
 
     /// The blocks of a cluster's row from cluster `first` to the diagonal: springs and diagonal terms.
     fn band(&self, first: usize, cluster: usize) -> Vec<Block> {
-        let Self { layout, body, system, offset_from_centroid, filters } = self;
+        let Self { layout, body, system, motions } = self;
+        let ClusterMotions { offset_from_centroid, filters } = motions;
         let mut blocks = vec![Block::default(); cluster + 1 - first];
         let last = cluster - first;
         for particle in body.order.clusters.range(cluster) {
@@ -71,7 +70,11 @@ impl Galerkin<'_> {
                         block.add_along(-1.0, w, mine, far);
                     } else {
                         for (scale, direction) in directions(record) {
-                            block.add(-scale, &self.along(particle, direction), &self.along(other, direction));
+                            block.add(
+                                -scale,
+                                &self.motions.along(particle, direction),
+                                &self.motions.along(other, direction),
+                            );
                         }
                     }
                 }
@@ -92,27 +95,19 @@ impl Galerkin<'_> {
     #[inline(always)]
     fn add_inside(&self, particle: usize, record: &Record, block: &mut Block) {
         let ends = [particle, record.other as usize];
-        let filters = ends.map(|end| self.filters.at(end));
+        let filters = ends.map(|end| self.motions.filters.at(end));
         let held = ends.map(|end| self.system.held[end]);
         if held == [false; 2] && filters == [None; 2] {
-            let [here, there] = ends.map(|end| to_f64(self.offset_from_centroid[end]));
+            let [here, there] = ends.map(|end| to_f64(self.motions.offset_from_centroid[end]));
             block.add_turn(f64::from(record.alpha), record.along(), here - there);
             return;
         }
         for (scale, direction) in directions(record) {
             let [here, there] =
-                ends.map(|end| if self.system.held[end] { [0.0; MODES] } else { self.along(end, direction) });
+                ends.map(|end| if self.system.held[end] { [0.0; MODES] } else { self.motions.along(end, direction) });
             let apart = std::array::from_fn(|mode| here[mode] - there[mode]);
             block.add(scale, &apart, &apart);
         }
-    }
-
-    /// Displacement of a particle along `direction` by each rigid motion of its cluster.
-    #[inline(always)]
-    fn along(&self, particle: usize, direction: DVec3) -> [f64; MODES] {
-        let direction = self.filters.at(particle).map_or(direction, |follows| follows.tr_mul(&direction));
-        let turned = to_f64(self.offset_from_centroid[particle]).cross(&direction);
-        [direction.x, direction.y, direction.z, turned.x, turned.y, turned.z]
     }
 
     /// Adds rank-one terms, those before `end`.
@@ -139,11 +134,11 @@ impl Galerkin<'_> {
     /// Change of a rank-one term by the rigid motions of each cluster. Empty if all its particles are in one cluster
     /// and unfiltered, since rigid motions change neither volumes nor gaps.
     fn couplings(&self, rows: &RankOneTerms, row: usize) -> Vec<Coupling> {
-        let Self { layout, system, filters, .. } = self;
+        let Self { layout, system, motions, .. } = self;
         let mut couplings: Vec<Coupling> = Vec::new();
         let home = |particle: usize| layout.cluster[particle] as usize;
         let particles = rows.particles(row);
-        let free = |particle: usize| !system.held[particle] && filters.at(particle).is_none();
+        let free = |particle: usize| !system.held[particle] && motions.filters.at(particle).is_none();
         if particles
             .iter()
             .all(|particle| home(*particle as usize) == home(particles[0] as usize) && free(*particle as usize))
@@ -156,7 +151,7 @@ impl Galerkin<'_> {
                 couplings.push(Coupling { cluster, along: [0.0; MODES] });
                 couplings.len() - 1
             });
-            couplings[at].along.iter_mut().zip(self.along(particle, g)).for_each(|(sum, along)| *sum += along);
+            couplings[at].along.iter_mut().zip(self.motions.along(particle, g)).for_each(|(sum, along)| *sum += along);
         }
         couplings
     }

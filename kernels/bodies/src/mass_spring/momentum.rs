@@ -2,8 +2,8 @@
 //! of linear solves.
 
 use super::body::SoftBody;
-use super::contact::{ContactConstraint, ContactMode};
-use super::stage::{FrameContext, Stage, StageSolver};
+use super::contact::ContactMode;
+use super::stage::{Stage, StageSolver};
 use numerics::pieces::pieces;
 use numerics::rotation::CayleyRotation;
 use numerics::vector::{DMat3, DVec3};
@@ -24,33 +24,22 @@ struct ObstacleContact {
     contact: usize,
     /// Sum of its weights.
     weight: f64,
-    /// As in [`ContactConstraint::stiffness_directions`].
-    directions: ([DVec3; 3], usize),
-}
-
-impl ObstacleContact {
-    /// Directions in which it has stiffness, scaled by the square root of that.
-    fn directions(&self) -> impl Iterator<Item = &DVec3> {
-        self.directions.0[..self.directions.1].iter()
-    }
+    /// As in [`super::contact::ContactConstraint::stiffness_directions`].
+    directions: Vec<DVec3>,
 }
 
 impl StageSolver {
     /// Finds the groups of pieces, joined by contacts with each other, that are not pinned; and which pieces have no
     /// contact.
-    pub(super) fn find_free_groups(&mut self, context: &FrameContext<'_>, contacts: &[ContactConstraint]) {
-        let pieces_in_all = context.body.order.pieces.len();
+    pub(super) fn find_free_groups(&mut self, stage: &Stage<'_>) {
+        let pieces_in_all = stage.context.body.order.pieces.len();
         let piece_of = |particle: usize| self.layout.piece_of(particle) as u32;
-        self.system.held.clone_from(&context.external.held);
         let (mut bound, mut touched) = (vec![false; pieces_in_all], vec![false; pieces_in_all]);
-        let alone = &self.system.isolated;
-        for particle in (0..context.body.len())
-            .filter(|particle| context.external.held[*particle] || alone.get(*particle) == Some(&true))
-        {
+        for particle in (0..stage.context.body.len()).filter(|particle| self.system.is_loose(*particle)) {
             bound[piece_of(particle) as usize] = true;
         }
         let mut links = Vec::new();
-        for contact in contacts {
+        for contact in stage.contacts {
             let first = piece_of(contact.particles[0] as usize);
             for (particle, _) in contact.sides() {
                 touched[piece_of(particle) as usize] = true;
@@ -67,46 +56,43 @@ impl StageSolver {
     }
 
     /// Total residual of each group.
-    pub(super) fn momentum_target(&self, body: &SoftBody, stage: &Stage<'_>) -> MomentumTarget {
+    pub(super) fn momentum_target(&self, stage: &Stage<'_>) -> MomentumTarget {
         let inertia = &self.system.inertia;
-        let sums = self.sums(body, |particle| (self.r[particle], inertia[particle]));
-        let (residual, mut stiffness): (Vec<DVec3>, Vec<DMat3>) =
-            sums.into_iter().map(|(residual, inertia)| (residual, DMat3::identity() * inertia)).unzip();
+        let residual = self.sums(stage, |particle| self.r[particle]);
+        let inertia = self.sums(stage, |particle| DVec3::repeat(inertia[particle]));
+        let mut stiffness: Vec<DMat3> = inertia.iter().map(DMat3::from_diagonal).collect();
         let obstacle_contacts = self.obstacle_contacts(stage);
         for obstacle in &obstacle_contacts {
             let shift = |direction: &DVec3| direction * direction.transpose() * (obstacle.weight * obstacle.weight);
-            obstacle.directions().for_each(|direction| stiffness[obstacle.group] += shift(direction));
+            obstacle.directions.iter().for_each(|direction| stiffness[obstacle.group] += shift(direction));
         }
         MomentumTarget { residual, stiffness, obstacle_contacts }
     }
 
     /// Contacts between groups and obstacles.
     fn obstacle_contacts(&self, stage: &Stage<'_>) -> Vec<ObstacleContact> {
-        let known = stage.contacts.iter().zip(&self.contact_states).zip(&self.friction_duals).enumerate();
-        let obstacle_contacts = known.filter(|known| known.1.0.1.mode != ContactMode::Open).filter_map(
-            |(index, ((contact, state), dual))| {
+        let known = stage.contacts.iter().zip(&self.contact_states).enumerate();
+        let obstacle_contacts =
+            known.filter(|known| known.1.1.mode != ContactMode::Open).filter_map(|(index, (contact, state))| {
                 let piece = self.layout.piece_of(contact.particles[0] as usize);
                 let group = self.groups[piece].filter(|_| !contact.is_two_sided())? as usize;
                 Some(ObstacleContact {
                     group,
                     contact: index,
                     weight: contact.point_weights.iter().sum(),
-                    directions: contact.stiffness_directions(state, stage.a, dual),
+                    directions: contact.stiffness_directions(state, stage.a).collect(),
                 })
-            },
-        );
+            });
         obstacle_contacts.collect()
     }
 
-    fn sums(&self, body: &SoftBody, of: impl Fn(usize) -> (DVec3, f64) + Sync) -> Vec<(DVec3, f64)> {
-        let clusters = &body.order.clusters;
-        let add = |sum: (DVec3, f64), part: (DVec3, f64)| (sum.0 + part.0, sum.1 + part.1);
-        let sums = clusters.map((), |cluster, ()| clusters.range(cluster).map(&of).fold((DVec3::zeros(), 0.0), add));
-        let mut groups = vec![(DVec3::zeros(), 0.0); body.order.pieces.len()];
-        for (piece, group) in body.order.pieces.iter().zip(&self.groups) {
+    fn sums(&self, stage: &Stage<'_>, of: impl Fn(usize) -> DVec3 + Sync) -> Vec<DVec3> {
+        let order = &stage.context.body.order;
+        let sums = order.clusters.map((), |cluster, ()| order.clusters.range(cluster).map(&of).sum::<DVec3>());
+        let mut groups = vec![DVec3::zeros(); order.pieces.len()];
+        for (piece, group) in order.pieces.iter().zip(&self.groups) {
             if let Some(group) = group {
-                let slot = &mut groups[*group as usize];
-                *slot = sums[piece.clone()].iter().copied().fold(*slot, add);
+                sums[piece.clone()].iter().for_each(|sum| groups[*group as usize] += sum);
             }
         }
         groups
@@ -114,13 +100,14 @@ impl StageSolver {
 
     /// Translates each group as a whole so that `dx` accounts for its entire residual, and updates `r`. Springs and
     /// volumes are not affected.
-    pub(super) fn correct_linear_momentum(&mut self, body: &SoftBody, stage: &Stage<'_>, target: &MomentumTarget) {
-        let given = self.sums(body, |particle| (self.dx[particle] * self.system.inertia[particle], 0.0));
+    pub(super) fn correct_linear_momentum(&mut self, stage: &Stage<'_>, target: &MomentumTarget) {
+        let body = stage.context.body;
+        let given = self.sums(stage, |particle| self.dx[particle] * self.system.inertia[particle]);
         let mut left: Vec<DVec3> =
-            target.residual.iter().zip(&given).map(|(residual, (given, _))| residual - given).collect();
+            target.residual.iter().zip(&given).map(|(residual, given)| residual - given).collect();
         for obstacle in &target.obstacle_contacts {
             let displacement = stage.contacts[obstacle.contact].weighted_sum(&self.dx);
-            obstacle.directions().for_each(|direction| {
+            obstacle.directions.iter().for_each(|direction| {
                 left[obstacle.group] -= direction * (obstacle.weight * direction.dot(&displacement))
             });
         }
@@ -129,19 +116,16 @@ impl StageSolver {
             if by.iter().all(|by| by.is_finite()) { by } else { DVec3::zeros() }
         };
         let by: Vec<DVec3> = left.iter().zip(&target.stiffness).map(by).collect();
-        for (piece, group) in body.order.pieces.iter().zip(&self.groups) {
-            let Some(group) = *group else { continue };
-            for particle in body.particles(piece) {
-                self.dx[particle] += by[group as usize];
-                self.r[particle] -= by[group as usize] * self.system.inertia[particle];
-            }
+        for (group, particle) in members(body, &self.groups) {
+            self.dx[particle] += by[group];
+            self.r[particle] -= by[group] * self.system.inertia[particle];
         }
         for obstacle in &target.obstacle_contacts {
             for (particle, weight) in stage.contacts[obstacle.contact].sides() {
                 let push = |sum: DVec3, direction: &DVec3| {
                     sum + direction * (weight * obstacle.weight * direction.dot(&by[obstacle.group]))
                 };
-                self.r[particle] -= obstacle.directions().fold(DVec3::zeros(), push);
+                self.r[particle] -= obstacle.directions.iter().fold(DVec3::zeros(), push);
             }
         }
     }
@@ -149,20 +133,11 @@ impl StageSolver {
     /// The positions `x`, with residual `r`, after each group was rotated as a whole so that it has the angular
     /// momentum that the stage's equation demands, which corrects the error of linear solves. Springs and volumes are
     /// not affected; the stiffness of contacts with obstacles is accounted for. `None` if there is nothing to rotate.
-    pub(super) fn corrected_angular_momentum(
-        &self,
-        body: &SoftBody,
-        stage: &Stage<'_>,
-        x: &[DVec3],
-    ) -> Option<Vec<DVec3>> {
+    pub(super) fn corrected_angular_momentum(&self, stage: &Stage<'_>, x: &[DVec3]) -> Option<Vec<DVec3>> {
         /// Moments of inertia below this fraction of the trace are treated as zero.
         const NEGLIGIBLE: f64 = 1e-9;
-        let inertia = &self.system.inertia;
-        let members = || {
-            let grouped = body.order.pieces.iter().zip(&self.groups);
-            let grouped = grouped.filter_map(|(piece, group)| Some(((*group)? as usize, piece)));
-            grouped.flat_map(|(group, piece)| body.particles(piece).map(move |particle| (group, particle)))
-        };
+        let (body, inertia) = (stage.context.body, &self.system.inertia);
+        let members = || members(body, &self.groups);
         let count = body.order.pieces.len();
         let mut middles = vec![(DVec3::zeros(), 0.0); count];
         for (group, particle) in members() {
@@ -182,7 +157,7 @@ impl StageSolver {
             let sides = stage.contacts[obstacle.contact].sides();
             let offset = sides
                 .fold(DVec3::zeros(), |sum, (particle, weight)| sum + (x[particle] - middles[obstacle.group]) * weight);
-            for direction in obstacle.directions() {
+            for direction in &obstacle.directions {
                 let torque_arm = offset.cross(direction);
                 turned[obstacle.group].1 += torque_arm * torque_arm.transpose();
             }
@@ -200,4 +175,11 @@ impl StageSolver {
         }
         Some(corrected)
     }
+}
+
+/// The particles of groups, with the group.
+fn members(body: &SoftBody, groups: &[Option<u32>]) -> impl Iterator<Item = (usize, usize)> {
+    let grouped = body.order.pieces.iter().zip(groups);
+    let grouped = grouped.filter_map(|(piece, group)| Some(((*group)? as usize, piece)));
+    grouped.flat_map(|(group, piece)| body.particles(piece).map(move |particle| (group, particle)))
 }

@@ -7,7 +7,6 @@
 use super::body::{SoftBody, volume};
 use super::springs::{self, RestLengths};
 use super::state::State;
-use numerics::vector::DVec3;
 
 /// Bounds on the plastic factor of a spring.
 const DENT_RANGE: [f64; 2] = [0.1, 10.0];
@@ -39,8 +38,8 @@ pub fn flow(
     }
     let share = -libm::expm1(-plasticity.creep * seconds);
     let before = elastic(body, state);
-    let x = solver_positions(body, &state.positions);
-    let drawn = drawn.map(|drawn| solver_positions(body, drawn));
+    let x = body.to_solver_order(&state.positions);
+    let drawn = drawn.map(|drawn| body.to_solver_order(drawn));
     for spring in 0..body.ends.len() {
         let (length, dent) = (state.lengths[spring], state.dents[spring]);
         let meant = match &drawn {
@@ -68,7 +67,7 @@ pub fn flow(
 pub fn reset(body: &SoftBody, state: &mut State, shape: &[[f64; 3]], share: f64, keep: f64) -> f64 {
     let before = elastic(body, state);
     let (share, keep) = (share.clamp(0.0, 1.0), keep.clamp(0.0, 1.0));
-    let goal = solver_positions(body, shape);
+    let goal = body.to_solver_order(shape);
     let blend = |from: f64, to: f64| if share >= 1.0 { to } else { from + (to - from) * share };
     for spring in 0..body.mesh_spring_count() {
         let length = springs::spring_length(body, &goal, spring);
@@ -93,7 +92,7 @@ pub fn reset(body: &SoftBody, state: &mut State, shape: &[[f64; 3]], share: f64,
 /// Tears explicit springs that are longer than `stretch` times their rest length and longer than `reach` metres;
 /// returns how many.
 pub fn tear(body: &SoftBody, state: &mut State, stretch: f64, reach: f64) -> u32 {
-    let x = solver_positions(body, &state.positions);
+    let x = body.to_solver_order(&state.positions);
     let mut torn = 0;
     for spring in body.mesh_spring_count()..body.ends.len() {
         let most = (stretch * state.lengths[spring] * state.dents[spring]).max(reach);
@@ -105,15 +104,11 @@ pub fn tear(body: &SoftBody, state: &mut State, stretch: f64, reach: f64) -> u32
     torn
 }
 
-fn solver_positions(body: &SoftBody, points: &[[f64; 3]]) -> Vec<DVec3> {
-    body.to_solver_order(points).into_iter().map(DVec3::from).collect()
-}
-
 /// Elastic energy of the springs, joules.
 fn elastic(body: &SoftBody, state: &State) -> f64 {
     let lengths = state.rest_lengths();
     let rest = RestLengths { lengths: &lengths, torn: &state.torn };
-    let x = solver_positions(body, &state.positions);
+    let x = body.to_solver_order(&state.positions);
     body.spring_partition
         .sum((), |part, ()| body.spring_partition.range(part).map(|at| springs::energy(body, &rest, &x, at)).sum())
 }

@@ -30,30 +30,20 @@ pub(super) struct RigidMotion {
 }
 
 impl RigidMotion {
-    /// The rigid motion with the momenta of a piece; at rest if it has particles that are `held`.
-    pub(super) fn new(
-        body: &SoftBody,
-        held: &[bool],
-        piece: &Range<usize>,
-        x: &[DVec3],
-        v: &[DVec3],
-        acceleration: &[DVec3],
-    ) -> Self {
+    /// The rigid motion with the momenta of a piece, by positions, velocities and accelerations of particles; at rest if it has particles that are `held`.
+    pub(super) fn new(body: &SoftBody, held: &[bool], piece: &Range<usize>, motion: [&[DVec3]; 3]) -> Self {
         let particles = body.particles(piece);
         let still = Self { particles: particles.clone(), ..Self::default() };
         if held[particles.clone()].contains(&true) {
             return still;
         }
-        let mass: f64 = body.mass[particles.clone()].iter().sum();
-        let mean = |values: &[DVec3]| {
-            let each = particles.clone().zip(&values[particles.clone()]);
-            each.map(|(particle, value)| value * body.mass[particle]).sum::<DVec3>() / mass
-        };
-        let [centroid, linear_velocity, acceleration] = [mean(x), mean(v), mean(acceleration)];
+        let mass = body.mass_of(particles.clone());
+        let [centroid, linear_velocity, acceleration] =
+            motion.map(|values| body.mean_by_mass(particles.clone(), values));
         let (mut turning, mut tensor) = (DVec3::zeros(), DMat3::zeros());
         for particle in particles.clone() {
-            let (offset, m) = (x[particle] - centroid, body.mass[particle]);
-            turning += offset.cross(&(v[particle] - linear_velocity)) * m;
+            let (offset, m) = (motion[0][particle] - centroid, body.mass[particle]);
+            turning += offset.cross(&(motion[1][particle] - linear_velocity)) * m;
             tensor += (DMat3::identity() * offset.norm_squared() - offset * offset.transpose()) * m;
         }
         tensor += DMat3::identity() * (NEGLIGIBLE * tensor.trace());
@@ -76,12 +66,6 @@ impl RigidMotion {
         }
     }
 
-    /// Centre of mass at positions `x`.
-    fn centre(&self, body: &SoftBody, x: &[DVec3]) -> DVec3 {
-        let mass: f64 = body.mass[self.particles.clone()].iter().sum();
-        self.particles.clone().map(|particle| x[particle] * body.mass[particle]).sum::<DVec3>() / mass
-    }
-
     /// The same without rotation, which impulses do not cause either.
     pub(super) fn without_rotation(self) -> Self {
         Self { angular_velocity: DVec3::zeros(), inverse_inertia: DMat3::zeros(), ..self }
@@ -89,7 +73,7 @@ impl RigidMotion {
 
     /// With accelerations given as velocities, the force and the torque ÷ radius of gyration that cause them, newtons.
     pub(super) fn force(&self, body: &SoftBody) -> f64 {
-        let mass: f64 = body.mass[self.particles.clone()].iter().sum();
+        let mass = body.mass_of(self.particles.clone());
         (mass * (mass * self.linear_velocity.norm_squared() + 2.0 * self.energy)).sqrt()
     }
 
@@ -127,17 +111,11 @@ pub(super) struct Predictor<'a> {
 }
 
 impl<'a> Predictor<'a> {
-    /// From `x`, `v` and the `acceleration` measured over the last step of `before` seconds. Pieces with
+    /// From positions, velocities and the accelerations measured over the last step of `before` seconds. Pieces with
     /// `loose` particles are not treated as rigid.
-    pub(super) fn new(
-        body: &'a SoftBody,
-        loose: &[bool],
-        x: &'a [DVec3],
-        v: &'a [DVec3],
-        acceleration: &'a [DVec3],
-        before: f64,
-    ) -> Self {
-        let rigid = |piece: &Range<usize>| RigidMotion::new(body, loose, piece, x, v, acceleration);
+    pub(super) fn new(body: &'a SoftBody, loose: &[bool], motion: [&'a [DVec3]; 3], before: f64) -> Self {
+        let rigid = |piece: &Range<usize>| RigidMotion::new(body, loose, piece, motion);
+        let [x, v, acceleration] = motion;
         Self { body, pieces: body.order.pieces.iter().map(rigid).collect(), x, v, acceleration, before }
     }
 
@@ -151,12 +129,7 @@ impl<'a> Predictor<'a> {
         let each: Vec<[CayleyRotation; 2]> = self
             .pieces
             .iter()
-            .map(|p| {
-                [
-                    CayleyRotation::by(p.angular_velocity * (-0.5 * self.before)),
-                    CayleyRotation::by(p.angular_velocity * seconds),
-                ]
-            })
+            .map(|piece| [-0.5 * self.before, seconds].map(|after| CayleyRotation::by(piece.angular_velocity * after)))
             .collect();
         self.map(|index, particle| {
             let (piece, [back, turn]) = (&self.pieces[index], &each[index]);
@@ -179,12 +152,12 @@ impl<'a> Predictor<'a> {
             start + velocity * seconds + (at - start - velocity * early) / (share * share)
         };
         let whole = |piece: &RigidMotion| {
-            let centre =
-                if piece.angular_velocity == DVec3::zeros() { piece.centroid } else { piece.centre(self.body, middle) };
-            let turns = [
-                CayleyRotation::by(piece.angular_velocity * early),
-                CayleyRotation::by(piece.angular_velocity * seconds),
-            ];
+            let centre = if piece.angular_velocity == DVec3::zeros() {
+                piece.centroid
+            } else {
+                self.body.mean_by_mass(piece.particles.clone(), middle)
+            };
+            let turns = [early, seconds].map(|after| CayleyRotation::by(piece.angular_velocity * after));
             (centre, on(piece.centroid, piece.linear_velocity, centre), turns)
         };
         let each: Vec<(DVec3, DVec3, [CayleyRotation; 2])> = self.pieces.iter().map(whole).collect();

@@ -6,9 +6,10 @@ use super::contact::ContactConstraint;
 use super::friction::LoadBalance;
 use super::springs;
 use super::stage::{CG_SHARE, CG_SHARE_PRECISE, FrameContext, Solved, Stage, StageSolver};
-use super::state::CachedCoarseFactor;
-use numerics::vector::DVec3;
+use numerics::vector::{DVec2, DVec3};
 
+/// Final ÷ initial residual.
+const SHARE: f64 = 0.05;
 /// Tolerance of linear solves with contacts, relative to the residual: more Newton iterations follow anyway. With 0.2 those
 /// of stiff bodies that hit a surface do not find their loads of friction.
 const CG_SHARE_LINE_SEARCH: f64 = 0.17;
@@ -28,19 +29,6 @@ const THINNING: f64 = 0.1;
 /// Fraction of the objective that is rounding: smaller decreases are not searched for.
 const ROUNDING: f64 = 1e-12;
 
-/// Stopping criteria of a descent.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct StopCriteria {
-    /// Final ÷ initial residual.
-    pub(super) share: f64,
-    /// Upper bound on the squared initial residual, so that a poor initial guess does not loosen the tolerance.
-    pub(super) scale: f64,
-    /// A squared residual that suffices in any case.
-    pub(super) square: f64,
-    /// Squared residual at the start of the step; 0 if this descent starts it.
-    pub(super) first: f64,
-}
-
 /// The objective, in two parts.
 #[derive(Clone, Copy, Debug, Default)]
 struct ObjectiveParts {
@@ -56,30 +44,21 @@ impl ObjectiveParts {
     }
 }
 
-/// Outcome of a line search.
-struct LineSearch {
-    /// Fraction of the direction taken; 0 if none lowers the objective.
-    share: f64,
-    /// Objective at the end.
-    lower: ObjectiveParts,
-    /// Whether particles were stopped at contacts.
-    stopped: bool,
-}
-
 impl StageSolver {
     /// Solves the stage from the initial guess `x` by Newton's method with line search, until the residual is small, no
     /// contact is too deep, and the loads of friction are the normal forces of bodies in balance. Updates the loads of
-    /// `contacts` on the way.
+    /// `contacts` on the way. `scale` bounds the squared initial residual, so that a poor initial guess does not loosen the
+    /// tolerance; what sufficed in descents of the step `before` suffices again.
     pub(super) fn descend(
         &mut self,
-        context: &FrameContext<'_>,
         stage: &Stage<'_>,
         contacts: &mut [ContactConstraint],
-        enough: StopCriteria,
-        cached: &mut CachedCoarseFactor,
+        scale: f64,
+        before: &Solved,
         x: &mut [DVec3],
     ) -> Solved {
-        self.begin(context, contacts);
+        let context = &stage.context;
+        self.begin(&Stage { contacts: &*contacts, ..*stage });
         let jammed = contacts.iter().any(|contact| contact.is_jammed(x));
         let most = match (contacts.is_empty(), jammed) {
             (true, _) => MOST,
@@ -92,17 +71,17 @@ impl StageSolver {
         let mut moved = f64::INFINITY;
         loop {
             let stage = &Stage { contacts: &*contacts, ..*stage };
-            self.assemble(context, stage, x, true);
-            let now = self.square(&context.body.order.clusters);
+            self.assemble(stage, x, true);
+            let now = self.square(stage);
             if solved.newton == 0 {
-                solved.first = if enough.first > 0.0 { enough.first } else { now };
-                let contacts = self.contact_objective(context, stage, x);
-                base = ObjectiveParts { contacts, others: self.other_objective(context, stage, x) };
-                solved.enough = enough.square.max(enough.share * enough.share * now.min(enough.scale));
+                solved.first = if before.first > 0.0 { before.first } else { now };
+                let contacts = self.contact_objective(stage, x);
+                base = ObjectiveParts { contacts, others: self.other_objective(stage, x) };
+                solved.enough = before.enough.max(SHARE * SHARE * now.min(scale));
             }
             solved.set_residual(now);
             let deep = contacts.iter().any(|contact| contact.is_too_deep(x));
-            let balance = if jammed { LoadBalance::default() } else { self.balance(context, stage, x) };
+            let balance = if jammed { LoadBalance::default() } else { self.balance(stage, x) };
             let reload = !balance.agrees() && reloads < MOST_RELOADS;
             if reload && !deep && (stuck || balance.is_readable()) {
                 let a = stage.a;
@@ -114,7 +93,7 @@ impl StageSolver {
             let is_cancelled = solved.newton > 0 && (context.cancelled)();
             if !wanted || stuck || is_cancelled || solved.newton >= most {
                 if moved > 0.0 && self.watch_thin(context, x) && !is_cancelled && solved.newton < most {
-                    base.others = self.other_objective(context, stage, x);
+                    base.others = self.other_objective(stage, x);
                     (slow, stuck, moved, self.measured) = (false, false, 0.0, true);
                     continue;
                 }
@@ -130,12 +109,12 @@ impl StageSolver {
             };
             self.store_noncontact_residual(stage);
             self.use_linearised_forces(stage);
-            if !self.direction(context, stage, asked, cached, x, &mut solved) {
+            if !self.direction(stage, asked, x, &mut solved) {
                 self.watch_thin(context, x);
                 break;
             }
             self.volumes.predict(context.body, &self.dx);
-            let LineSearch { share, lower, stopped } = self.search(context, stage, x, base);
+            let (share, lower, stopped) = self.search(stage, x, base);
             self.follow(stage, share, x);
             self.measured = share > 0.0;
             let all = share > LONG && !stopped;
@@ -146,75 +125,65 @@ impl StageSolver {
                 self.forget_pressures();
             }
             base = lower;
-            moved += share * self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max);
+            moved += share * self.longest_move();
             if moved > THINNING * context.body.spacing {
                 moved = 0.0;
                 if self.watch_thin(context, x) {
-                    base.others = self.other_objective(context, stage, x);
+                    base.others = self.other_objective(stage, x);
                 }
             }
         }
         let stage = &Stage { contacts: &*contacts, ..*stage };
-        if self.correct_angular_momentum_downhill(context, stage, base.sum(), x) && !solved.failed {
-            solved.set_residual(self.square(&context.body.order.clusters));
+        if self.correct_angular_momentum_downhill(stage, base.sum(), x) && !solved.failed {
+            solved.set_residual(self.square(stage));
         }
         solved
     }
 
     /// Corrects the angular momentum of free groups, unless that raises the objective above `base`, as closing
     /// contacts may. Returns whether `x` was changed.
-    fn correct_angular_momentum_downhill(
-        &mut self,
-        context: &FrameContext<'_>,
-        stage: &Stage<'_>,
-        base: f64,
-        x: &mut [DVec3],
-    ) -> bool {
-        let turned = self.corrected_angular_momentum(context.body, stage, x);
+    fn correct_angular_momentum_downhill(&mut self, stage: &Stage<'_>, base: f64, x: &mut [DVec3]) -> bool {
+        let turned = self.corrected_angular_momentum(stage, x);
         let Some(turned) = turned.filter(|turned| turned != x) else { return false };
-        let level = self.contact_objective(context, stage, &turned) + self.other_objective(context, stage, &turned);
+        let level = self.contact_objective(stage, &turned) + self.other_objective(stage, &turned);
         self.measured = level <= base + ROUNDING * base.abs();
         if self.measured {
             x.copy_from_slice(&turned);
-            self.assemble(context, stage, x, false);
+            self.assemble(stage, x, false);
             return true;
         }
-        velocities(&context.body.order.clusters, x, stage, &mut self.v);
+        velocities(stage, x, &mut self.v);
         false
     }
 
     /// The objective ½(x − y)ᵀM(x − y) + a²·(potentials) without contacts, at positions for which
     /// [`Self::contact_objective`] was just evaluated.
-    fn other_objective(&mut self, context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3]) -> f64 {
-        let (body, a) = (context.body, stage.a);
+    fn other_objective(&mut self, stage: &Stage<'_>, x: &[DVec3]) -> f64 {
+        let (FrameContext { body, external, .. }, a) = (stage.context, stage.a);
         self.volumes.measure(body, x);
-        let stored = self.volumes.stored + self.volumes.damped;
-        let watched = &self.inventory.watched;
-        let thin: f64 = self.volumes.thin_tets(body, x, context.volumes, watched).iter().map(|thin| thin.energy).sum();
+        let [stored, thin] = self.volumes.energy(&stage.context, x, &self.inventory.watched);
         let (v, links) = (&self.v, &self.links);
         let clusters = &body.order.clusters;
-        let (mut own, mut inertial) = (0.0, 0.0);
-        for (mine, moved) in clusters.map((), |cluster, ()| {
-            clusters.range(cluster).fold((0.0, 0.0), |(own, inertial), particle| {
+        let sums = clusters.sum((), |cluster, ()| {
+            clusters.range(cluster).fold(DVec2::zeros(), |sum, particle| {
                 let springs = springs::energy_at(body.adjacency.of(particle, links), x, particle);
-                if context.external.held[particle] {
-                    return (own + springs, inertial);
+                if external.held[particle] {
+                    return sum + DVec2::new(springs, 0.0);
                 }
                 let mass = body.mass[particle];
-                let energy = context.external.energy(particle, mass, stage.time, a, x[particle], v[particle]);
-                (own + springs + energy, inertial + 0.5 * mass * (x[particle] - stage.y[particle]).norm_squared())
+                let energy = external.energy(particle, mass, stage.time, a, x[particle], v[particle]);
+                let inertial = 0.5 * mass * (x[particle] - stage.y[particle]).norm_squared();
+                DVec2::new(sum.x + springs + energy, sum.y + inertial)
             })
-        }) {
-            own += mine;
-            inertial += moved;
-        }
-        inertial + a * a * (stored + thin + own)
+        });
+        let (own, inertial) = (sums.x, sums.y);
+        inertial + a * a * (stored + self.volumes.damped + thin + own)
     }
 
     /// Contribution of contacts to the objective at `x`; sets the velocities to those at `x`.
-    fn contact_objective(&mut self, context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3]) -> f64 {
-        let (body, a) = (context.body, stage.a);
-        velocities(&body.order.clusters, x, stage, &mut self.v);
+    fn contact_objective(&mut self, stage: &Stage<'_>, x: &[DVec3]) -> f64 {
+        let (body, a) = (stage.context.body, stage.a);
+        velocities(stage, x, &mut self.v);
         let of = |contact: &ContactConstraint| {
             let state = contact.at(x, &self.v, stage.early, body.size);
             state.energy + contact.friction_energy(&self.v, a, body.size)
@@ -233,42 +202,37 @@ impl StageSolver {
     }
 
     /// Tries 1, ½, ¼ … of `dx` until the objective falls below `base`, each both unchanged and limited by [`stop`].
-    /// `dx` becomes the direction actually taken.
+    /// `dx` becomes the direction actually taken. Returns the fraction of it, 0 if none lowers the objective, the objective at
+    /// the end, and whether particles were stopped at contacts.
     ///
     /// The contact part is evaluated first: a trial is rejected without evaluating the rest if contacts gain more
     /// than the rest can lose along its initial slope. Moving too far into a contact is the usual reason for a
     /// rejection.
-    fn search(
-        &mut self,
-        context: &FrameContext<'_>,
-        stage: &Stage<'_>,
-        x: &[DVec3],
-        base: ObjectiveParts,
-    ) -> LineSearch {
+    fn search(&mut self, stage: &Stage<'_>, x: &[DVec3], base: ObjectiveParts) -> (f64, ObjectiveParts, bool) {
         let mut trial = std::mem::take(&mut self.trial);
-        let mut found = LineSearch { share: 0.0, lower: base, stopped: false };
+        let mut found = (0.0, base, false);
         let most = base.sum() + ROUNDING * base.sum().abs();
-        let clusters = &context.body.order.clusters;
+        let clusters = &stage.context.body.order.clusters;
         let shares = std::iter::successors(Some(1.0), |share| Some(0.5 * share)).take(HALVINGS);
         for (share, stopped) in shares.flat_map(|share| [(share, false), (share, true)]) {
             if !stopped {
                 trial.clear();
                 trial.extend(x.iter().zip(&self.dx).map(|(x, d)| x + d * share));
-            } else if !stop(context, stage, x, &mut trial) {
+            } else if !stop(stage, x, &mut trial) {
                 continue;
             }
-            let contacts = self.contact_objective(context, stage, &trial);
+            let contacts = self.contact_objective(stage, &trial);
             let lost = |particle: usize| self.noncontact_residual[particle].dot(&(trial[particle] - x[particle]));
-            let lost = clusters.sum((), |cluster, ()| clusters.range(cluster).map(lost).sum());
+            let lost: f64 = clusters.sum((), |cluster, ()| clusters.range(cluster).map(lost).sum());
             if base.sum() + (contacts - base.contacts) - lost > most {
                 continue;
             }
-            let lower = ObjectiveParts { contacts, others: self.other_objective(context, stage, &trial) };
+            let lower = ObjectiveParts { contacts, others: self.other_objective(stage, &trial) };
             if lower.sum() <= most {
                 if stopped {
                     self.dx.iter_mut().zip(&trial).zip(x).for_each(|((d, trial), x)| *d = (trial - x) / share);
                 }
-                found = LineSearch { share, lower, stopped };
+                found = (share, lower, stopped);
                 break;
             }
         }
@@ -280,9 +244,9 @@ impl StageSolver {
 /// Stops single points on their way from `x` to `trial` where they would get too deep into a contact; returns
 /// whether there were any. The direction does not know of contacts that it closes and linearises their forces; a
 /// single such point would otherwise shorten the step of all others.
-fn stop(context: &FrameContext<'_>, stage: &Stage<'_>, x: &[DVec3], trial: &mut [DVec3]) -> bool {
+fn stop(stage: &Stage<'_>, x: &[DVec3], trial: &mut [DVec3]) -> bool {
     let mut stopped = false;
-    let held = &context.external.held;
+    let held = &stage.context.external.held;
     for contact in stage.contacts.iter().filter(|contact| contact.is_of_one_point()) {
         if contact.sides().all(|side| held[side.0]) {
             continue;

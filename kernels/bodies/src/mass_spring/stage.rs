@@ -6,8 +6,8 @@
 //! converge.
 
 use super::body::SoftBody;
-use super::coarse::{self, ContactFilters, Layout};
-use super::conjugate_gradients::{self, Coarse, Limits};
+use super::coarse::{self, ClusterMotions, ContactFilters, Layout};
+use super::conjugate_gradients::{Coarse, Limits, Reached};
 use super::contact::{ContactConstraint, ContactState};
 use super::external::ExternalForces;
 use super::galerkin::Galerkin;
@@ -41,8 +41,9 @@ const NONLINEAR: f64 = 0.35;
 const RISE: f64 = 100.0;
 
 /// The equation of a stage.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 pub(super) struct Stage<'a> {
+    pub(super) context: FrameContext<'a>,
     pub(super) y: &'a [DVec3],
     pub(super) z: &'a [DVec3],
     /// Step coefficient, seconds.
@@ -58,6 +59,20 @@ pub(super) struct Stage<'a> {
     pub(super) line_search: bool,
     /// Index of the stage in its step, for the iteration counts.
     pub(super) index: usize,
+}
+
+impl<'a> Stage<'a> {
+    /// The stage of a line search that ends at `time` with step coefficient `a`, with neither contacts nor a bound on noise.
+    pub(super) fn new(context: FrameContext<'a>, [y, z]: [&'a [DVec3]; 2], a: f64, time: f64) -> Self {
+        Self { context, y, z, a, time, contacts: &[], early: 0.0, rotational_energy: &[], line_search: true, index: 0 }
+    }
+
+    /// a²f − M(x − y) of a particle at `x` on which a `force` acts; 0 if it is `held`.
+    #[inline(always)]
+    pub(super) fn residual(&self, held: bool, particle: usize, x: &[DVec3], force: DVec3) -> DVec3 {
+        let mass = self.context.body.mass[particle];
+        if held { DVec3::zeros() } else { force * (self.a * self.a) - (x[particle] - self.y[particle]) * mass }
+    }
 }
 
 /// What is constant during a frame.
@@ -131,7 +146,8 @@ pub(super) struct StageSolver {
     pub(super) links: Vec<Link>,
     /// Sum of spring stiffnesses at each particle, N/m.
     pub(super) particle_stiffness: Vec<f64>,
-    pub(super) scratch: conjugate_gradients::Scratch,
+    /// The factored coarse matrix, that of the state during a frame.
+    pub(super) cached: CachedCoarseFactor,
     /// Velocities at the current positions.
     pub(super) v: Vec<DVec3>,
     /// Residual, a²f − M(x − y).
@@ -142,15 +158,8 @@ pub(super) struct StageSolver {
     pub(super) trial: Vec<DVec3>,
     pub(super) thin_tets: Vec<ThinTet>,
     pub(super) contact_states: Vec<ContactState>,
-    /// Friction dual of each contact: predicted friction relative to its bound.
-    pub(super) friction_duals: Vec<DVec3>,
-    /// Predicted normal force of each contact, newtons, and pressure of thin tetrahedra, Pa, in ascending order; `None` before
-    /// the first linear system.
-    pub(super) predicted_loads: Vec<f64>,
+    /// Predicted pressure of thin tetrahedra, Pa, in ascending order; `None` before the first linear system.
     pub(super) predicted_pressures: Option<Vec<(u32, f64)>>,
-    /// Contacts and thin tetrahedra that were linearised around another force than the current one, and the difference.
-    pub(super) contact_offsets: Vec<(usize, f64)>,
-    pub(super) thin_offsets: Vec<(usize, f64)>,
     /// Forces of contacts and thin tetrahedra; may be empty: none.
     pub(super) transient_forces: Vec<DVec3>,
     /// For each piece the free group it belongs to: pieces joined by contacts of which none is pinned. And which
@@ -166,6 +175,7 @@ impl StageSolver {
             records: vec![Record::default(); body.adjacency.incident.len()],
             inertia: vec![0.0; count],
             held: vec![false; count],
+            isolated: vec![false; count],
             smoother: vec![[0.0; 6]; count],
             ..System::default()
         };
@@ -184,91 +194,70 @@ impl StageSolver {
         volumes: Vec<f64>,
     ) {
         springs::links(context.body, &context.rest, a, before, &mut self.links);
-        self.volumes.begin(a, volumes);
+        (self.volumes.a, self.volumes.before) = (a, volumes);
         self.measured = false;
     }
 
-    /// Prepares a solve with `contacts`.
-    pub(super) fn begin(&mut self, context: &FrameContext<'_>, contacts: &[ContactConstraint]) {
-        self.find_free_groups(context, contacts);
-        self.friction_duals.clear();
-        self.friction_duals.resize(contacts.len(), DVec3::zeros());
+    /// Prepares a solve.
+    pub(super) fn begin(&mut self, stage: &Stage<'_>) {
+        self.find_free_groups(stage);
         self.forget_pressures();
-        self.predicted_loads.clear();
-        self.predicted_loads.extend(contacts.iter().map(|contact| contact.load));
+        self.contact_states.clear();
+        self.contact_states.extend(stage.contacts.iter().map(ContactConstraint::unsolved));
     }
 
     /// Solves the stage from the initial guess `x`, whose pinned particles are already in place, by Newton's method
     /// without line search; then corrects the angular momentum of free groups.
-    pub(super) fn solve(
-        &mut self,
-        context: &FrameContext<'_>,
-        stage: &Stage<'_>,
-        newton: Newton,
-        cached: &mut CachedCoarseFactor,
-        x: &mut [DVec3],
-    ) -> Solved {
-        self.begin(context, stage.contacts);
-        let mut solved = self.iterate(context, stage, newton, cached, x);
-        if let Some(corrected) = self.corrected_angular_momentum(context.body, stage, x) {
+    pub(super) fn solve(&mut self, stage: &Stage<'_>, newton: Newton, x: &mut [DVec3]) -> Solved {
+        self.begin(stage);
+        let mut solved = Solved::default();
+        loop {
+            self.assemble(stage, x, true);
+            let before = self.square(stage);
+            if solved.newton == 0 {
+                solved.first = before;
+            }
+            let asked = if stage.contacts.is_empty() { CG_SHARE } else { CG_SHARE_PRECISE };
+            if !self.direction(stage, asked, x, &mut solved) {
+                break;
+            }
+            let predicted = std::mem::take(&mut self.r);
+            self.follow(stage, 1.0, x);
+            self.r = vec![DVec3::zeros(); x.len()];
+            self.assemble(stage, x, false);
+            let after = self.square(stage);
+            solved.set_residual(after);
+            solved.failed |= after > RISE * before;
+            let wanted = if newton.tolerance > 0.0 {
+                self.longest_move() > newton.tolerance
+            } else {
+                let clusters = &stage.context.body.order.clusters;
+                let deviation = |particle: usize| self.r[particle] - predicted[particle];
+                self.squared_norm(clusters, deviation) > NONLINEAR * NONLINEAR * before
+            };
+            if solved.failed || !wanted || solved.newton >= newton.most || (stage.context.cancelled)() {
+                break;
+            }
+        }
+        if let Some(corrected) = self.corrected_angular_momentum(stage, x) {
             x.copy_from_slice(&corrected);
-            self.assemble(context, stage, x, false);
+            self.assemble(stage, x, false);
             if !solved.failed {
-                solved.set_residual(self.square(&context.body.order.clusters));
+                solved.set_residual(self.square(stage));
             }
         }
         solved
     }
 
-    fn iterate(
-        &mut self,
-        context: &FrameContext<'_>,
-        stage: &Stage<'_>,
-        newton: Newton,
-        cached: &mut CachedCoarseFactor,
-        x: &mut [DVec3],
-    ) -> Solved {
-        let clusters = &context.body.order.clusters;
-        let mut solved = Solved::default();
-        loop {
-            self.assemble(context, stage, x, true);
-            let before = self.square(clusters);
-            if solved.newton == 0 {
-                solved.first = before;
-            }
-            let asked = if stage.contacts.is_empty() { CG_SHARE } else { CG_SHARE_PRECISE };
-            if !self.direction(context, stage, asked, cached, x, &mut solved) {
-                return solved;
-            }
-            let predicted = std::mem::take(&mut self.r);
-            self.follow(stage, 1.0, x);
-            self.r = vec![DVec3::zeros(); x.len()];
-            self.assemble(context, stage, x, false);
-            let after = self.square(clusters);
-            solved.set_residual(after);
-            solved.failed |= after > RISE * before;
-            let wanted = if newton.tolerance > 0.0 {
-                self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max) > newton.tolerance
-            } else {
-                self.distance(clusters, &predicted) > NONLINEAR * NONLINEAR * before
-            };
-            if solved.failed || !wanted || solved.newton >= newton.most || (context.cancelled)() {
-                return solved;
-            }
-        }
+    /// The largest component of the direction `dx`, metres.
+    pub(super) fn longest_move(&self) -> f64 {
+        self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max)
     }
 
     /// Applies a fraction `share` of `dx` and updates the predictions of forces.
     pub(super) fn follow(&mut self, stage: &Stage<'_>, share: f64, x: &mut [DVec3]) {
-        let known = stage
-            .contacts
-            .iter()
-            .zip(&self.contact_states)
-            .zip(&mut self.friction_duals)
-            .zip(&mut self.predicted_loads);
-        for (((contact, state), dual), push) in known {
-            *dual = contact.next_dual(state, dual, &self.dx, share, stage.a);
-            *push = contact.predicted_force(state, &self.dx, share);
+        for (contact, state) in stage.contacts.iter().zip(&mut self.contact_states) {
+            contact.predict(state, &self.dx, share, stage.a);
         }
         self.volumes.shorten_predicted(share);
         let pressures = self.thin_tets.iter().map(|thin| (thin.tet, thin.predicted(&self.dx, share)));
@@ -289,20 +278,14 @@ impl StageSolver {
 
     /// A⁻¹r, computed with conjugate gradients if it has to be `accurate`, and approximated by the preconditioner if not;
     /// and the number of iterations.
-    pub(super) fn filter(
-        &mut self,
-        body: &SoftBody,
-        cached: &CachedCoarseFactor,
-        accurate: bool,
-        mut r: Vec<DVec3>,
-    ) -> (Vec<DVec3>, u32) {
-        let coarse = Coarse::new(cached, &self.offset_from_centroid);
+    pub(super) fn filter(&mut self, body: &SoftBody, accurate: bool, mut r: Vec<DVec3>) -> (Vec<DVec3>, u32) {
+        let coarse = Coarse::new(body, &self.cached, &self.offset_from_centroid);
         if !accurate {
-            return (conjugate_gradients::precondition(&self.system, body, coarse, &r), 0);
+            return (coarse.precondition(&self.system, &r), 0);
         }
-        let (limits, scratch) = (Limits { share: CG_SHARE, square: f64::INFINITY, cap: CG_CAP }, &mut self.scratch);
         let mut out = vec![DVec3::zeros(); r.len()];
-        let reached = conjugate_gradients::solve(&mut self.system, body, coarse, limits, scratch, &mut out, &mut r);
+        let limits = Limits { share: CG_SHARE, square: f64::INFINITY, cap: CG_CAP };
+        let reached = coarse.solve(&mut self.system, limits, &mut out, &mut r);
         (out, reached.iterations)
     }
 
@@ -314,55 +297,45 @@ impl StageSolver {
 
     /// Computes the Newton direction `dx` at `x` until the residual `r` of the linear system has fallen to the share that is
     /// `asked`. Returns false if the direction is not finite.
-    pub(super) fn direction(
-        &mut self,
-        context: &FrameContext<'_>,
-        stage: &Stage<'_>,
-        asked: f64,
-        cached: &mut CachedCoarseFactor,
-        x: &[DVec3],
-        solved: &mut Solved,
-    ) -> bool {
-        let body = context.body;
+    pub(super) fn direction(&mut self, stage: &Stage<'_>, asked: f64, x: &[DVec3], solved: &mut Solved) -> bool {
+        let body = stage.context.body;
         self.dx.clear();
         self.dx.resize(x.len(), DVec3::zeros());
-        let target = self.momentum_target(body, stage);
-        self.correct_linear_momentum(body, stage, &target);
+        let target = self.momentum_target(stage);
+        self.correct_linear_momentum(stage, &target);
         coarse::offset_from_centroid(&body.order.clusters, x, &mut self.offset_from_centroid);
         let filters = ContactFilters::new(&self.system, &self.layout);
-        let old = cached.factor.len() != self.layout.rows() || cached.iterations_since > OLD;
-        if old || filters.change(&cached.filters) > CONTACTS_CHANGED {
-            self.renew(body, cached, filters);
+        let old = self.cached.factor.len() != self.layout.rows() || self.cached.iterations_since > OLD;
+        if old || filters.change(&self.cached.filters) > CONTACTS_CHANGED {
+            self.renew(body, filters);
         }
-        let initial_iterations = &mut cached.initial_iterations[stage.index];
-        let bound =
-            if *initial_iterations == 0 { CG_CAP } else { (3 * *initial_iterations).max(*initial_iterations + 10) };
+        let usual = self.cached.initial_iterations[stage.index];
+        let bound = if usual == 0 { CG_CAP } else { (3 * usual).max(usual + 10) };
         let free = stage.rotational_energy.iter().zip(&self.free_pieces).filter(|piece| *piece.1);
         let rotational_energy: f64 = free.map(|piece| piece.0).sum();
         let square =
             if rotational_energy > 0.0 { 2.0 * stage.a * stage.a * NOISE * rotational_energy } else { f64::INFINITY };
         let searching = !stage.contacts.is_empty() && stage.line_search;
-        let limits = Limits { share: asked, square, cap: bound.min(CG_CAP) };
-        let mut reached = self.gradients(body, cached, limits);
+        let mut reached = self.gradients(body, Limits { share: asked, square, cap: bound.min(CG_CAP) });
         solved.cg += reached.iterations;
         if !reached.met && bound < CG_CAP {
             // The factor is too old to be useful: continue with a new one.
-            self.renew(body, cached, ContactFilters::new(&self.system, &self.layout));
-            let limits = Limits { share: (asked / reached.share.max(asked)).min(1.0), square, cap: CG_CAP };
-            reached = self.gradients(body, cached, limits);
+            self.renew(body, ContactFilters::new(&self.system, &self.layout));
+            let share = (asked / reached.share.max(asked)).min(1.0);
+            reached = self.gradients(body, Limits { share, square, cap: CG_CAP });
             solved.cg += reached.iterations;
         }
-        cached.iterations_since += reached.iterations;
-        let initial_iterations = &mut cached.initial_iterations[stage.index];
-        if *initial_iterations == 0 {
-            *initial_iterations = reached.iterations.max(1);
-        } else if !searching && f64::from(reached.iterations) > STALE * f64::from(*initial_iterations) + 1.0 {
-            *cached = CachedCoarseFactor::default();
+        self.cached.iterations_since += reached.iterations;
+        let usual = &mut self.cached.initial_iterations[stage.index];
+        if *usual == 0 {
+            *usual = reached.iterations.max(1);
+        } else if !searching && f64::from(reached.iterations) > STALE * f64::from(*usual) + 1.0 {
+            self.cached = CachedCoarseFactor::default();
         }
         let gave_up = !reached.met && self.is_unsettled(body);
         solved.caps += u32::from(gave_up);
         // The linear solve left part of the residual; momentum has to be exact.
-        self.correct_linear_momentum(body, stage, &target);
+        self.correct_linear_momentum(stage, &target);
         solved.newton += 1;
         solved.failed = !self.dx.iter().all(|d| d.iter().all(|d| d.is_finite()));
         !solved.failed
@@ -375,27 +348,22 @@ impl StageSolver {
         self.dx.iter().any(|d| d.norm() > least)
     }
 
-    fn gradients(
-        &mut self,
-        body: &SoftBody,
-        cached: &CachedCoarseFactor,
-        limits: Limits,
-    ) -> conjugate_gradients::Reached {
-        let coarse = Coarse::new(cached, &self.offset_from_centroid);
-        conjugate_gradients::solve(&mut self.system, body, coarse, limits, &mut self.scratch, &mut self.dx, &mut self.r)
+    fn gradients(&mut self, body: &SoftBody, limits: Limits) -> Reached {
+        let coarse = Coarse::new(body, &self.cached, &self.offset_from_centroid);
+        coarse.solve(&mut self.system, limits, &mut self.dx, &mut self.r)
     }
 
-    fn renew(&mut self, body: &SoftBody, cached: &mut CachedCoarseFactor, filters: ContactFilters) {
-        let (layout, system, offset_from_centroid) = (&self.layout, &self.system, &self.offset_from_centroid);
-        cached.factor = Galerkin { layout, body, system, offset_from_centroid, filters: &filters }.factor();
-        (cached.filters, cached.initial_iterations, cached.iterations_since) = (filters, [0; 2], 0);
+    fn renew(&mut self, body: &SoftBody, filters: ContactFilters) {
+        let motions = ClusterMotions { offset_from_centroid: &self.offset_from_centroid, filters: &filters };
+        let factor = Galerkin { layout: &self.layout, body, system: &self.system, motions }.factor();
+        self.cached = CachedCoarseFactor { factor, filters, ..CachedCoarseFactor::default() };
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::body::{Material, Mesh};
-    use super::super::search::StopCriteria;
+    use super::super::frame::SolverFrame;
     use super::*;
     use crate::tets::cubes;
 
@@ -407,7 +375,8 @@ mod tests {
         let material = Material { density: 1000.0.into(), stiffness: 1e4.into(), damping: 0.01.into() };
         let mesh = Mesh { points: &points, tets: &tets, ..Mesh::default() };
         let body = SoftBody::new(&mesh, &material, &[]).unwrap();
-        let external = ExternalForces::new(&body, DVec3::zeros(), 0.0, h, &[], &[]);
+        let frame = SolverFrame { gravity: [0.0; 3], ..SolverFrame::default() };
+        let external = ExternalForces::new(&body, &frame, h);
         let rest = RestLengths { lengths: &body.lengths, torn: &[] };
         let context =
             FrameContext { body: &body, external: &external, rest, volumes: &body.volumes, cancelled: &|| false };
@@ -419,17 +388,16 @@ mod tests {
             springs::particle_stiffness(&body, &context.rest, &mut solver.particle_stiffness);
             let volumes = solver.volumes.at(&body, &start);
             solver.set_step_start(&context, h, |a, b| springs::distance(&start, a, b), volumes);
-            let stage = Stage { y: &inertial, z: &start, a: h, time: 1.0, line_search, ..Stage::default() };
-            let (mut cached, mut x) = (CachedCoarseFactor::default(), inertial.clone());
+            let stage = Stage { line_search, ..Stage::new(context, [&inertial, &start], h, 1.0) };
+            let mut x = inertial.clone();
             let solved = if line_search {
-                let enough = StopCriteria { share: 0.05, scale: f64::INFINITY, square: 0.0, first: 0.0 };
-                solver.descend(&context, &stage, &mut [], enough, &mut cached, &mut x)
+                solver.descend(&stage, &mut [], f64::INFINITY, &Solved::default(), &mut x)
             } else {
-                solver.solve(&context, &stage, Newton { most: 1, tolerance: 0.0 }, &mut cached, &mut x)
+                solver.solve(&stage, Newton { most: 1, tolerance: 0.0 }, &mut x)
             };
-            solver.assemble(&context, &stage, &x, false);
-            assert!(solver.corrected_angular_momentum(&body, &stage, &x).is_some(), "nothing holds the block");
-            let residual = (solver.square(&body.order.clusters) / solved.first).sqrt();
+            solver.assemble(&stage, &x, false);
+            assert!(solver.corrected_angular_momentum(&stage, &x).is_some(), "nothing holds the block");
+            let residual = (solver.square(&stage) / solved.first).sqrt();
             assert!(residual > 0.0 && !solved.failed, "{solved:?}");
             let off = (solved.residual / residual - 1.0).abs();
             assert!(off < 1e-9, "line search {line_search}: {} instead of {residual}", solved.residual);

@@ -28,13 +28,19 @@ pub struct State {
     pub(super) acceleration: Vec<[f64; 3]>,
     /// The last normal force of contacts on each contact point, newtons; empty at the start.
     pub(super) loads: Vec<f64>,
+    pub(super) carried: Carried,
+    pub(super) cached: CachedCoarseFactor,
+}
+
+/// What steps carry over besides the motion.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Carried {
     /// Number of steps still to be taken with implicit Euler.
     pub(super) euler_steps_left: u32,
-    /// Energy that steps without external driving have dissipated so far, joules.
+    /// Energy that steps without external driving have dissipated so far, and that rounding in later ones may return, joules.
     pub(super) energy_budget: f64,
     /// Pieces in contact, if bounces are limited.
     pub(super) impacts: Vec<Impact>,
-    pub(super) cached: CachedCoarseFactor,
 }
 
 /// The factored coarse matrix, kept while it is good enough; iteration counts depend on it.
@@ -61,9 +67,7 @@ impl State {
             torn: vec![false; body.lengths.len()],
             acceleration: Vec::new(),
             loads: Vec::new(),
-            euler_steps_left: 0,
-            energy_budget: 0.0,
-            impacts: Vec::new(),
+            carried: Carried::default(),
             cached: CachedCoarseFactor::default(),
         }
     }

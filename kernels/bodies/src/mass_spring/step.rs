@@ -11,13 +11,12 @@
 //! which contacts change or that failed; it is repeated from its start.
 
 use super::body::SoftBody;
-use super::bounce::Impact;
 use super::contact::{ContactConstraint, ContactMode};
 use super::energy::{Energies, measure};
 use super::frame::{FrameReport, Integrator, SolverFrame};
 use super::predictor::RigidMotion;
 use super::stage::{FrameContext, Solved, StageSolver};
-use super::state::CachedCoarseFactor;
+use super::state::Carried;
 use super::volume::Inventory;
 use numerics::vector::DVec3;
 
@@ -35,10 +34,27 @@ pub(super) struct Kinematics {
     pub(super) acceleration: Vec<DVec3>,
     /// The last normal forces of contacts on each contact point, newtons.
     pub(super) loads: Vec<f64>,
+    pub(super) carried: Carried,
 }
 
-/// Motion, energy budget, number of steps of implicit Euler left, and pieces in contact at the start of a step.
-pub(super) type StepStart = (Kinematics, f64, u32, Vec<Impact>);
+/// A step to take.
+#[derive(Clone, Copy)]
+pub(super) struct Interval<'a> {
+    pub(super) start: &'a Kinematics,
+    /// Start and end, as fractions of the frame.
+    pub(super) times: [f64; 2],
+    /// Length, seconds.
+    pub(super) h: f64,
+}
+
+/// The end of a step, or of a stage, which has no errors.
+pub(super) struct StepEnd {
+    pub(super) x: Vec<DVec3>,
+    pub(super) v: Vec<DVec3>,
+    /// Estimated errors of positions, metres.
+    pub(super) errors: Vec<DVec3>,
+    pub(super) solved: Solved,
+}
 
 /// Outcome of a step.
 #[derive(Clone, Copy, Debug, Default)]
@@ -69,46 +85,37 @@ pub(super) struct Stepper<'a> {
     pub(super) seconds: f64,
     /// Error of positions in a frame that [`Integrator::Accurate`] allows, metres.
     pub(super) tolerance: Option<f64>,
-    pub(super) cached: &'a mut CachedCoarseFactor,
-    /// Number of steps still to be taken with implicit Euler.
-    pub(super) euler_steps_left: &'a mut u32,
-    /// Energy that steps have dissipated so far, and that rounding in later ones may return, joules.
-    pub(super) energy_budget: &'a mut f64,
-    /// Pieces in contact, if bounces are limited.
-    pub(super) impacts: &'a mut Vec<Impact>,
     /// Energies after the last step that was accepted, and what is reported of all of them.
     pub(super) energies: Energies,
     pub(super) report: FrameReport,
 }
 
 impl Stepper<'_> {
-    /// Steps between two `times`, as fractions of the frame.
-    pub(super) fn step(&mut self, motion: &mut Kinematics, times: [f64; 2]) -> Stepped {
+    /// Steps from `start` between two `times`, as fractions of the frame.
+    pub(super) fn step(&mut self, start: &Kinematics, times: [f64; 2]) -> (Kinematics, Stepped) {
         let before = &{ self.energies };
         let h = (times[1] - times[0]) * self.seconds;
-        let start = motion.clone();
-        let mut full = match self.frame.contacts {
-            Some(_) => {
-                let ahead: Vec<DVec3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
-                self.contacts(&start, &ahead, times)
-            }
-            None => Vec::new(),
-        };
+        let step = Interval { start, times, h };
+        let mut motion = start.clone();
+        let ahead: Vec<DVec3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
+        let mut full = self.contacts(step, &ahead);
         let turned = self.frame.volume > 0.0 && self.solver.inventory.inverted > 0;
         // Frozen contacts continue linearly, so surfaces that are being separated would be thrown apart.
         let through = full.iter().any(|contact| contact.is_penetrating(&start.x, h));
-        let force_implicit_euler = *self.euler_steps_left > 0 || self.frame.force_implicit_euler || turned || through;
-        *self.euler_steps_left = self.euler_steps_left.saturating_sub(1);
-        let (mut stepped, errors, after) = if force_implicit_euler || self.frame.integrator == Integrator::Euler {
-            let damped = self.frame.force_implicit_euler || turned;
-            let (solved, errors) = self.euler(motion, times, &mut full, damped);
-            (Stepped { solved, euler: true, ..Stepped::default() }, errors, None)
+        let damped = self.frame.force_implicit_euler || turned;
+        let euler = start.carried.euler_steps_left > 0 || damped || through;
+        motion.carried.euler_steps_left = start.carried.euler_steps_left.saturating_sub(1);
+        let (end, after) = if euler || self.frame.integrator == Integrator::Euler {
+            (self.euler(step, &mut full, damped), None)
         } else {
-            self.tr_bdf2_or_euler(motion, times, before, &mut full)
+            self.tr_bdf2_or_euler(step, before, &mut full, &mut motion.carried.euler_steps_left)
         };
+        let StepEnd { x, v, errors, solved } = end;
+        (motion.x, motion.v) = (x, v);
+        let mut stepped = Stepped { solved, euler: after.is_none(), ..Stepped::default() };
         stepped.estimate = errors.iter().map(DVec3::norm_squared).fold(0.0, f64::max).sqrt();
         if full.iter().any(|c| (c.clearance(&start.x, h) < 0.0) != (c.clearance(&motion.x, 0.0) < 0.0)) {
-            *self.euler_steps_left = (*self.euler_steps_left).max(1);
+            motion.carried.euler_steps_left = motion.carried.euler_steps_left.max(1);
         }
         (stepped.contacts, stepped.overlap) = self.solver.active_contacts();
         stepped.overlap = stepped.overlap.max(stepped.solved.deepest);
@@ -121,97 +128,74 @@ impl Stepper<'_> {
         let acceleration =
             |(v, before): (&DVec3, &DVec3)| if discontinuous { DVec3::zeros() } else { (v - before) / h };
         motion.acceleration = motion.v.iter().zip(&start.v).map(acceleration).collect();
-        motion.loads = self.loads(&full, |contact| contact.load_at(&motion.x));
-        self.keep_finite(&start, motion, &mut stepped);
+        motion.loads = self.loads(&full, |contact| contact.load_at(&motion.x, 0.0));
+        self.keep_finite(start, &mut motion, &mut stepped);
         // Infinity is no limit, not even times an approach of 0.
         let bounce = self.frame.bounce.filter(|bounce| bounce.is_finite());
-        let slowed = bounce.and_then(|bounce| self.limit_bounce(bounce, &full, &start, motion, h));
-        self.refresh_inventory(motion);
+        let slowed = bounce.and_then(|bounce| self.limit_bounce(bounce, &full, step, &mut motion));
+        self.refresh_inventory(&motion.x);
         stepped.after = match after.filter(|_| stepped.stopped == 0 && slowed.is_none()) {
             Some(energies) => energies,
-            None => measure(self.solver, &self.context, times[1], motion, false),
+            None => measure(self.solver, &self.context, times[1], [&motion.x, &motion.v], false),
         };
         if self.undriven() {
-            self.remove_energy_gain(before, motion, &mut stepped);
+            self.remove_energy_gain(before, &mut motion, &mut stepped);
         } else {
-            *self.energy_budget = 0.0;
+            motion.carried.energy_budget = 0.0;
         }
-        stepped.impact_error = self.impact_error([&start, motion], &full, &errors, h);
-        stepped.energy_lost =
-            self.energy_lost([before, &stepped.after], &start, motion, &full, times) + slowed.unwrap_or(0.0);
-        stepped
+        stepped.impact_error = self.impact_error(step, &motion, &full, &errors);
+        stepped.energy_lost = self.energy_lost([before, &stepped.after], step, &motion, &full) + slowed.unwrap_or(0.0);
+        (motion, stepped)
     }
 
     /// A step of TR-BDF2 with frozen contacts, repeated with implicit Euler where that fails, gains energy, or the set of
-    /// active contacts or of thin tetrahedra changes. Returns the estimated errors of positions and the energies at the
-    /// end too, if they are known.
+    /// active contacts or of thin tetrahedra changes. Returns the energies at the end too, if it was not repeated.
     fn tr_bdf2_or_euler(
         &mut self,
-        motion: &mut Kinematics,
-        times: [f64; 2],
+        step: Interval<'_>,
         before: &Energies,
         contacts: &mut Vec<ContactConstraint>,
-    ) -> (Stepped, Vec<DVec3>, Option<Energies>) {
-        let (h, size) = ((times[1] - times[0]) * self.seconds, self.context.body.size);
-        let start = motion.clone();
+        euler_steps_left: &mut u32,
+    ) -> (StepEnd, Option<Energies>) {
+        let (Interval { start, times, h }, size) = (step, self.context.body.size);
         let frozen: Vec<ContactConstraint> = contacts.iter().map(|c| c.frozen(&start.x, &start.v, h, size)).collect();
-        let (mut solved, errors) = self.tr_bdf2(motion, times, &frozen);
         let (mut gained, mut active_set_unchanged) = (false, true);
-        if let Some(errors) = errors {
-            let energies = measure(self.solver, &self.context, times[1], motion, true);
-            let gain = energies.sum() - before.sum();
-            gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
-            active_set_unchanged = frozen.iter().all(|contact| contact.active_set_unchanged(&motion.x, &motion.v));
-            if active_set_unchanged {
-                let (found, missed) = self.find_missed(contacts, &start, &motion.x, times);
-                solved.deepest = deepest(&found, &motion.x);
-                active_set_unchanged = !missed;
+        let solved = match self.tr_bdf2(step, &frozen) {
+            Err(halfway) => halfway,
+            Ok(mut end) => {
+                let energies = measure(self.solver, &self.context, times[1], [&end.x, &end.v], true);
+                let gain = energies.sum() - before.sum();
+                gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
+                active_set_unchanged = frozen.iter().all(|contact| contact.active_set_unchanged(&end.x, &end.v));
+                if active_set_unchanged {
+                    let (found, missed) = self.find_missed(contacts, step, &end.x);
+                    end.solved.deepest = deepest(&found, &end.x);
+                    active_set_unchanged = !missed;
+                }
+                let thinned = active_set_unchanged && self.solver.watch_thin(&self.context, &end.x);
+                if !(end.solved.failed || gained || !active_set_unchanged || thinned) && energies.sum().is_finite() {
+                    return (end, Some(energies));
+                }
+                end.solved
             }
-            let thinned = active_set_unchanged && self.solver.watch_thin(&self.context, &motion.x);
-            if !(solved.failed || gained || !active_set_unchanged || thinned) && energies.sum().is_finite() {
-                return (Stepped { solved, ..Stepped::default() }, errors, Some(energies));
-            }
-        }
-        motion.clone_from(&start);
-        let (again, errors) = self.euler(motion, times, contacts, solved.failed || gained);
-        let solved = Solved { failed: again.failed, residual: again.residual, ..sum(solved, again) };
-        *self.euler_steps_left = if active_set_unchanged { 0 } else { EULER_STEPS_AFTER_CHANGE };
-        (Stepped { solved, euler: true, ..Stepped::default() }, errors, None)
+        };
+        let mut end = self.euler(step, contacts, solved.failed || gained);
+        let Solved { failed, residual, .. } = end.solved;
+        end.solved = Solved { failed, residual, ..sum(solved, end.solved) };
+        *euler_steps_left = if active_set_unchanged { 0 } else { EULER_STEPS_AFTER_CHANGE };
+        (end, None)
     }
 
-    /// What a step starts from, to repeat it.
-    pub(super) fn start(&self, motion: &Kinematics) -> StepStart {
-        (motion.clone(), *self.energy_budget, *self.euler_steps_left, self.impacts.clone())
-    }
-
-    /// Goes back to the start of a step.
-    pub(super) fn restart(&mut self, start: StepStart, motion: &mut Kinematics) {
-        (*motion, *self.energy_budget, *self.euler_steps_left, *self.impacts) = start;
-        self.refresh_inventory(motion);
-    }
-
-    /// Takes stock of the tetrahedra at the current positions, for the next step.
-    pub(super) fn refresh_inventory(&mut self, motion: &Kinematics) {
+    /// Takes stock of the tetrahedra at `x`, for the next step.
+    pub(super) fn refresh_inventory(&mut self, x: &[DVec3]) {
         let seen = self.solver.latest_inventory.take();
-        self.solver.inventory =
-            seen.unwrap_or_else(|| Inventory::new(self.context.body, &motion.x, self.context.volumes));
+        self.solver.inventory = seen.unwrap_or_else(|| Inventory::new(self.context.body, x, self.context.volumes));
     }
 
     /// Whether nothing external but gravity and resting goals did work in the step: contacts may be near, but not
     /// closed.
     fn undriven(&self) -> bool {
         !self.context.external.moves() && self.solver.contact_states.iter().all(|state| state.mode == ContactMode::Open)
-    }
-
-    /// Particles that do not move with their piece: pinned and isolated ones.
-    pub(super) fn loose(&self) -> Vec<bool> {
-        let (held, alone) = (&self.context.external.held, &self.solver.system.isolated);
-        (0..held.len()).map(|particle| held[particle] || alone.get(particle) == Some(&true)).collect()
-    }
-
-    /// Moves pinned particles to their positions at `time`, with velocities (x − z)/a.
-    pub(super) fn pin(&self, x: &mut [DVec3], z: &mut [DVec3], time: f64, a: f64) {
-        self.context.external.hold(time, x, z, a);
     }
 
     /// Stops particles whose result is not finite where they were.
@@ -234,18 +218,19 @@ impl Stepper<'_> {
         const MOST_BUDGET: f64 = 2e-3;
         let after = &mut stepped.after;
         let gained = after.sum() - before.sum();
-        *self.energy_budget = (*self.energy_budget - gained).min(MOST_BUDGET * after.scale());
-        if *self.energy_budget >= -ROUNDING * before.scale().max(after.scale()) {
+        let budget = &mut motion.carried.energy_budget;
+        *budget = (*budget - gained).min(MOST_BUDGET * after.scale());
+        if *budget >= -ROUNDING * before.scale().max(after.scale()) {
             return;
         }
         let body = self.context.body;
         let held = &self.context.external.held;
         // Takes energy from the deformation first, then from all motion but translation: momentum is conserved.
         for turning in [true, false] {
-            let gained = -*self.energy_budget;
+            let gained = -*budget;
             let mut moved = motion.v.clone();
             for piece in &body.order.pieces {
-                let rigid = RigidMotion::new(body, held, piece, &motion.x, &motion.v, &motion.acceleration);
+                let rigid = RigidMotion::new(body, held, piece, [&motion.x, &motion.v, &motion.acceleration]);
                 let rigid = if turning { rigid } else { rigid.without_rotation() };
                 for particle in rigid.particles.clone() {
                     moved[particle] = rigid.velocity(motion.x[particle]);
@@ -263,7 +248,7 @@ impl Stepper<'_> {
                 motion.v[particle] = moved[particle] + own(&motion.v, particle) * keep;
             }
             let kinetic = kinetic(body, &motion.v);
-            *self.energy_budget += after.kinetic - kinetic;
+            *budget += after.kinetic - kinetic;
             stepped.energy_removed += after.kinetic - kinetic;
             after.kinetic = kinetic;
         }

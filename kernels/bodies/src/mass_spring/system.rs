@@ -7,7 +7,6 @@
 
 use super::body::SoftBody;
 use super::springs::Record;
-use numerics::partition::Partition;
 use numerics::rank_one::RankOneTerms;
 use numerics::vector::DVec3;
 
@@ -23,7 +22,7 @@ pub(super) struct System {
     pub(super) blocks: Vec<[f64; 6]>,
     /// Pinned particles.
     pub(super) held: Vec<bool>,
-    /// Particles without intact springs; empty if there are none.
+    /// Particles without intact springs.
     pub(super) isolated: Vec<bool>,
     /// Terms of regions.
     pub(super) regions: RankOneTerms,
@@ -37,7 +36,8 @@ pub(super) struct System {
 
 impl System {
     /// Writes A·p to `out` and returns pᵀAp. `p` is 0 at pinned particles.
-    pub(super) fn apply(&mut self, body: &SoftBody, clusters: &Partition, p: &[DVec3], out: &mut [DVec3]) -> f64 {
+    pub(super) fn apply(&mut self, body: &SoftBody, p: &[DVec3], out: &mut [DVec3]) -> f64 {
+        let clusters = &body.order.clusters;
         self.regions.measure(p);
         self.transient.measure(p);
         let system = &*self;
@@ -80,12 +80,16 @@ impl System {
         })
     }
 
-    /// Marks particles whose springs have no stiffness as isolated.
-    pub(super) fn set_isolated(&mut self, particle_stiffness: &[f64]) {
+    /// Sets which particles are `held`, and marks those whose springs have no stiffness as isolated.
+    pub(super) fn set_loose(&mut self, held: &[bool], particle_stiffness: &[f64]) {
+        self.held.copy_from_slice(held);
         self.isolated.clear();
-        if particle_stiffness.contains(&0.0) {
-            self.isolated.extend(particle_stiffness.iter().map(|k| *k == 0.0));
-        }
+        self.isolated.extend(particle_stiffness.iter().map(|k| *k == 0.0));
+    }
+
+    /// Whether a particle does not move with its piece: it is pinned or isolated.
+    pub(super) fn is_loose(&self, particle: usize) -> bool {
+        self.held[particle] || self.isolated[particle]
     }
 }
 

@@ -7,8 +7,9 @@
 //! system positive semi-definite.
 
 use super::body::{SoftBody, volume};
+use super::stage::FrameContext;
 use numerics::partition::{Partition, RaggedSlice};
-use numerics::vector::DVec3;
+use numerics::vector::{DVec2, DVec3};
 
 /// Bulk modulus of the springs ÷ E: their Poisson ratio is a quarter.
 const SPRINGS: f64 = 2.0 / 3.0;
@@ -44,8 +45,6 @@ pub(super) struct Volumes {
     pub(super) gradients: Vec<DVec3>,
     /// Pressure of each region, Pa.
     pub(super) pressures: Vec<f64>,
-    /// Derivative of the pressure with respect to volume within the stage, Pa/m³.
-    slopes: Vec<f64>,
     /// Change of each region's volume from its rest volume, m³, and its dashpot's part of the slope, Pa/m³.
     changes: Vec<[f64; 2]>,
     /// Elastic pressure, Pa, and its derivative, with which each region enters the linear system, and the difference of
@@ -53,11 +52,11 @@ pub(super) struct Volumes {
     tangents: Vec<[f64; 2]>,
     pub(super) offsets: Vec<f64>,
     /// Elastic pressure of each region that the last linear system predicts, Pa; empty before the first.
-    predicted: Vec<f64>,
+    pub(super) predicted: Vec<f64>,
     /// Step coefficient of the stage, seconds, and volumes at its start: dashpots act on (V − those)/a, as for
     /// springs.
-    a: f64,
-    before: Vec<f64>,
+    pub(super) a: f64,
+    pub(super) before: Vec<f64>,
     /// Stored energy when last measured, and the potential of the dashpots in a line search, joules.
     pub(super) stored: f64,
     pub(super) damped: f64,
@@ -72,6 +71,8 @@ pub(super) struct ThinTet {
     /// μ ÷ V₀, and the pressure that opens it, Pa.
     pub(super) stiffness: f64,
     pub(super) pressure: f64,
+    /// Difference of the pressure around which it was linearised from the current one, Pa.
+    pub(super) offset: f64,
     pub(super) energy: f64,
     pub(super) tet: u32,
     /// Its stiffness where it begins to be thin, Pa/m³, what it has to gain to be that, and its rest volume, m³.
@@ -81,13 +82,13 @@ pub(super) struct ThinTet {
 }
 
 impl ThinTet {
-    /// Linearises the pressure at an `expected` one; returns the difference from the current one, Pa.
-    pub(super) fn linearise(&mut self, expected: f64) -> f64 {
+    /// Linearises the pressure at an `expected` one.
+    pub(super) fn linearise(&mut self, expected: f64) {
         let before = self.pressure;
         if let Some((push, slope)) = tangent(expected / self.opening, self.left, self.rest, [THIN_STIFFENING, THIN]) {
             (self.pressure, self.stiffness) = (self.opening * push, self.opening * slope);
         }
-        self.pressure - before
+        self.offset = self.pressure - before;
     }
 
     /// Pressure that the linearisation predicts after a fraction `share` of the step `dx`, Pa.
@@ -119,7 +120,6 @@ impl Volumes {
             partition: Some(partition),
             gradients: vec![DVec3::zeros(); regions.particles.len()],
             pressures: vec![0.0; regions.len()],
-            slopes: vec![0.0; regions.len()],
             changes: vec![[0.0; 2]; regions.len()],
             tangents: vec![[0.0; 2]; regions.len()],
             offsets: vec![0.0; regions.len()],
@@ -158,35 +158,27 @@ impl Volumes {
         out
     }
 
-    /// Starts a stage of `a` with volumes `before`.
-    pub(super) fn begin(&mut self, a: f64, before: Vec<f64>) {
-        (self.a, self.before) = (a, before);
-    }
-
     /// Measures pressures, gradients and energies.
     pub(super) fn measure(&mut self, body: &SoftBody, x: &[DVec3]) {
         let Some(partition) = &self.partition else { return };
         let (regions, stiffness, rest, before, a) = (&body.regions, &self.stiffness, &self.rest, &self.before, self.a);
         let gradients = RaggedSlice::new(&regions.starts, &mut self.gradients);
-        let out = (&mut self.pressures[..], &mut self.slopes[..], &mut self.changes[..], gradients);
-        let sums = partition.map(out, |part, (pressures, slopes, changes, mut gradients)| {
-            let (mut stored, mut damped) = (0.0, 0.0);
-            let regions_here = partition.range(part).zip(pressures).zip(slopes).zip(changes).zip(gradients.iter_mut());
-            for ((((region, pressure), slope), change), mine) in regions_here {
+        let out = (&mut self.pressures[..], &mut self.changes[..], gradients);
+        let sums = partition.sum(out, |part, (pressures, changes, mut gradients)| {
+            let mut sums = DVec2::zeros();
+            let regions_here = partition.range(part).zip(pressures).zip(changes).zip(gradients.iter_mut());
+            for (((region, pressure), change), mine) in regions_here {
                 let volume = regions.measure(region, x, mine);
                 let k = stiffness[region];
-                let (push, steep, energy) =
-                    stiffened(volume - rest[region], rest[region], [STIFFENING, STIFFENING_END]);
+                let (push, _, energy) = stiffened(volume - rest[region], rest[region], [STIFFENING, STIFFENING_END]);
                 let (dashed, more) = (k * regions.damping[region] / a, volume - before[region]);
                 *change = [volume - rest[region], dashed];
                 *pressure = k * push + dashed * more;
-                *slope = k * steep + dashed;
-                stored += k * energy;
-                damped += 0.5 * dashed * more * more;
+                sums += DVec2::new(k * energy, 0.5 * dashed * more * more);
             }
-            (stored, damped)
+            sums
         });
-        (self.stored, self.damped) = sums.into_iter().fold((0.0, 0.0), |sum, part| (sum.0 + part.0, sum.1 + part.1));
+        (self.stored, self.damped) = (sums.x, sums.y);
     }
 
     /// Energy that the regions' dashpots take in a step of `h` seconds at the rate last measured, joules.
@@ -194,21 +186,15 @@ impl Volumes {
         if self.a > 0.0 { 2.0 * self.damped * h / self.a } else { 0.0 }
     }
 
-    /// Forgets predictions.
-    pub(super) fn forget(&mut self) {
-        self.predicted.clear();
-    }
-
-    /// Linearises the elastic pressures, as last measured, at the predicted ones.
+    /// Linearises the elastic pressures, as last measured, at the predicted ones, if there are any.
     pub(super) fn linearise(&mut self) {
-        for (region, [change, dashed]) in self.changes.iter().enumerate() {
+        for (region, [change, _]) in self.changes.iter().enumerate() {
             let (k, rest, range) = (self.stiffness[region], self.rest[region], [STIFFENING, STIFFENING_END]);
             let (now, slope, _) = stiffened(*change, rest, range);
             let predicted = self.predicted.get(region).and_then(|expected| tangent(expected / k, *change, rest, range));
             let (push, slope) = predicted.unwrap_or((now, slope));
             self.offsets[region] = k * (push - now);
             self.tangents[region] = [k * push, k * slope];
-            self.slopes[region] = k * slope + dashed;
         }
     }
 
@@ -233,9 +219,16 @@ impl Volumes {
         }
     }
 
-    /// Weight of each region's rank-one term in a stage of `a`, as last measured.
+    /// Weight of each region's rank-one term in a stage of `a`, as last linearised.
     pub(super) fn weights(&self, a: f64) -> Vec<f64> {
-        self.slopes.iter().map(|slope| slope * a * a).collect()
+        let known = self.tangents.iter().zip(&self.changes);
+        known.map(|([_, slope], [_, dashed])| (slope + dashed) * a * a).collect()
+    }
+
+    /// Energy that is stored in regions, as last measured, and in thin tetrahedra, joules.
+    pub(super) fn energy(&self, context: &FrameContext<'_>, x: &[DVec3], watched: &[u32]) -> [f64; 2] {
+        let thin = self.thin_tets(context.body, x, context.volumes, watched);
+        [self.stored, thin.iter().map(|thin| thin.energy).sum()]
     }
 
     /// The thin ones among the `watched` tetrahedra.
@@ -259,6 +252,7 @@ impl Volumes {
                 gradient: opening(at),
                 stiffness: stiffness * slope,
                 pressure: stiffness * push,
+                offset: 0.0,
                 energy: stiffness * energy,
             };
             (left > 0.0 && thin.energy.is_finite()).then_some(thin)
