@@ -1,8 +1,8 @@
 //! Times of the wind chain: `cargo bench --bench wind`.
 //!
 //! Chains of Curve_Wind_Shielding, Curve_Wind_Gusts, Curve_Wind, Curve_Jiggle and Curve_Wind_Collision, on upright fur
-//! on a sphere of 20,480 triangles and on the bear of `graphs/`; frames in order, no cache, nothing written. Then
-//! collision's two methods by their error.
+//! on a sphere of 20,480 triangles, on guides that Curve_Deform lets it follow, and on the bear of `graphs/`; frames in
+//! order, no cache, nothing written. Then collision's two methods by their error.
 
 use std::convert::Infallible;
 use std::fmt::Write as _;
@@ -59,6 +59,8 @@ enum Fur {
     Sphere(usize, usize),
     /// The same on a sphere through which a swelling runs, so that skin and curves move at every frame.
     Swelling(usize, usize),
+    /// The curves on a sphere follow guides: their number, then that of the curves and of the CVs of both.
+    Guided(usize, usize, usize),
     Bear,
 }
 
@@ -71,6 +73,7 @@ fn main() {
     let small = [FULL, LOFT, STILL, NO_COLLISION, NO_COLLIDERS, SMOOTH].map(|chain| (chain, graph(chain, sphere, 24)));
     let bear = graph(FULL, Fur::Bear, 24);
     let moving = graph(FULL, Fur::Swelling(10_000, 5), 24);
+    let guided = graph(FULL, Fur::Guided(500, 10_000, 5), 24);
     let larger =
         [(100_000, 5), (10_000, 32)].map(|(curves, cvs)| (curves, cvs, graph(FULL, Fur::Sphere(curves, cvs), 6)));
     let largest = graph(FULL, Fur::Sphere(1_000_000, 5), 6);
@@ -84,6 +87,10 @@ fn main() {
         figures.add("full chain, 10,000 × 5, 1 thread", 24, report.cooking);
         for node in report.nodes.iter().filter(|node| node.type_name.starts_with("Curve_")) {
             figures.add(format!("    of it {}", node.type_name), 24, node.wall);
+        }
+        for (engine, threads) in [(&two, ""), (&one, ", 1 thread")] {
+            let name = format!("full chain on 500 guides + Curve_Deform, 10,000 × 5{threads}");
+            figures.add(name, 24, cook(engine, &guided, 1..=24).cooking);
         }
         figures.add("full chain, 10,000 × 5, frame 24 alone", 1, cook(&two, &small[0].1, 24..=24).cooking);
         figures.add("full chain, bear (10,275 × 5)", 24, cook(&two, &bear, 1..=24).cooking);
@@ -205,6 +212,13 @@ fn graph(chain: Chain<'_>, fur: Fur, last: i64) -> Graph {
     if let Some(params) = chain.collision {
         add("Curve_Wind_Collision", r#", "rest": "fur", "colliders": ["skin"]"#, params);
     }
+    if let Fur::Guided(..) = fur {
+        let inputs = format!(r#""curves": "groom", "rest_guides": "fur", "guides": "{before}", "skin": "skin""#);
+        nodes
+            .push_str(r#""groom": { "type": "Curve_In", "params": { "file": "../assets/fur_bear_10k_curves.obj" } },"#);
+        write!(nodes, r#""hairs": {{ "type": "Curve_Deform", "inputs": {{ {inputs} }} }},"#).expect("memory");
+        before = "hairs";
+    }
     let text = format!(
         r#"{{ "convect": 1, "scene": {{ "frames": [1, {last}], "seed": 7 }}, "nodes": {{ {nodes} }}, "outputs": {{ "fur": "{before}" }} }}"#
     );
@@ -214,6 +228,11 @@ fn graph(chain: Chain<'_>, fur: Fur, last: i64) -> Graph {
     match fur {
         Fur::Sphere(curves, cvs) => {
             give(&mut graph, "fur", upright(curves, cvs));
+            give(&mut graph, "skin", sphere());
+        }
+        Fur::Guided(guides, curves, cvs) => {
+            give(&mut graph, "fur", upright(guides, cvs));
+            give(&mut graph, "groom", upright(curves, cvs));
             give(&mut graph, "skin", sphere());
         }
         Fur::Swelling(curves, cvs) => {

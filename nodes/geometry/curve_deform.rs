@@ -125,7 +125,9 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let (mut kept, mut length_error, mut off_skin) = (KeptOut::default(), 0.0, 0);
     if !skin_rests || guides.positions() != rest_guides.positions() {
         let on_skin = match skins {
-            Some((_, now)) => now.kept(SameBound(bound.clone()), || Ok(OnSkin::new(&bound, now, skin_rests)))?,
+            Some((_, now)) => {
+                now.kept(SameBound(bound.clone()), || Ok(OnSkin::new(&bound, curves.element_count(), now, skin_rests)))?
+            }
             None => Arc::new(OnSkin::without(&bound, curves, rest_guides, guides)),
         };
         let deformed = deformed(cx, &bound, &on_skin, [rest_guides, guides])?;
@@ -335,10 +337,10 @@ struct OnSkin {
 }
 
 impl OnSkin {
-    fn new(bound: &Bound, skin: &Component, rests: bool) -> Self {
+    fn new(bound: &Bound, curves: usize, skin: &Component, rests: bool) -> Self {
         let moved = bound.on_skin.as_ref().filter(|_| !rests);
         let poses = moved.map(|(hairs, guides)| (hairs.poses(skin.positions()), guides.poses(skin.positions())));
-        Self { poses, clearance: Clearance::default() }
+        Self { poses, clearance: Clearance::of(curves) }
     }
 
     /// Without a skin.
@@ -347,7 +349,7 @@ impl OnSkin {
         let guides = guide_poses(starts, rest.positions(), now.positions());
         let roots = [curves, rest].map(|part| RootPositions::of(part.runs().starts(), part.positions()));
         let hairs = carried_poses(&bound.weights, roots[0].as_slice(), roots[1].as_slice(), &guides);
-        Self { poses: Some((hairs, guides)), clearance: Clearance::default() }
+        Self { poses: Some((hairs, guides)), clearance: Clearance::of(curves.element_count()) }
     }
 
     fn hairs(&self) -> Option<&[RootPose]> {

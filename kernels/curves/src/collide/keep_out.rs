@@ -14,6 +14,7 @@
 use super::crossing::crosses_block;
 use super::hair::SKIPPED_GAPS;
 use super::half_space::HalfSpace;
+use super::kept_half_spaces::KeptHalfSpaces;
 use super::segment_turn::{Nearby, gather};
 use super::{Collide, ContactMethod, SkinSurface, collide};
 use crate::attach::{RootPose, attach_curve, relative_stretch};
@@ -26,8 +27,6 @@ use numerics::tree::TriangleTree;
 use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
 use settle::{Entered, settle};
 use std::ops::Range;
-use std::sync::OnceLock;
-use std::sync::atomic::{AtomicU32, Ordering};
 
 mod clear_lanes;
 mod settle;
@@ -60,12 +59,12 @@ pub struct KeepOut<'a> {
     pub clearance: &'a Clearance,
 }
 
-/// Where curves meet nothing. Keep it while skin, rest shapes, poses and gap do not change: it is found at the second
-/// use, because on a skin that moves in each frame it would cost more than it saves.
-#[derive(Debug, Default)]
+/// Where curves meet nothing. Keep it while skin, rest shapes, poses and gap do not change: it is found from the second
+/// use on, because on a skin that moves in each frame it would cost more than it saves. Threads that use it at the same time
+/// share that work.
+#[derive(Debug)]
 pub struct Clearance {
-    uses: AtomicU32,
-    half_spaces: OnceLock<Vec<HalfSpace>>,
+    half_spaces: KeptHalfSpaces,
 }
 
 /// What [`keep_out`] did.
@@ -86,7 +85,8 @@ pub struct KeptOut {
 /// from rest until it met the skin.
 ///
 /// # Panics
-/// If `starts` does not run up to the number of points, of `points` and of the rest shapes.
+/// If `starts` does not run up to the number of points, of `points` and of the rest shapes, or if there are more curves than
+/// in [`Clearance::of`].
 pub fn keep_out(starts: &[u32], points: &mut [Vec3], how: &KeepOut<'_>) -> KeptOut {
     keep_out_on(Path::chosen(), starts, points, how)
 }
@@ -94,7 +94,8 @@ pub fn keep_out(starts: &[u32], points: &mut [Vec3], how: &KeepOut<'_>) -> KeptO
 /// [`keep_out`] on a given SIMD path.
 pub(super) fn keep_out_on(path: Path, starts: &[u32], points: &mut [Vec3], how: &KeepOut<'_>) -> KeptOut {
     let curves = starts.len().saturating_sub(1);
-    let half_spaces = how.clearance.used(path, starts, how);
+    let half_spaces = &how.clearance.half_spaces;
+    half_spaces.used(|curves, found| look_up(path, curves, starts, how, found));
     let tasks = (0..curves).step_by(TASK_CURVES).map(|first| first..curves.min(first + TASK_CURVES));
     let entered = parallel::map(tasks, |_, curves| entering(path, curves, starts, points, how, half_spaces));
     let entered = parallel::concat(entered);
@@ -136,7 +137,7 @@ fn turn_out(
     points: &mut [Vec3],
     how: &KeepOut<'_>,
     curves: &[Entering],
-    half_spaces: &[HalfSpace],
+    half_spaces: &KeptHalfSpaces,
     kept: &mut KeptOut,
 ) {
     let Entering { lifted, at_rest, .. } = curves[0];
@@ -229,30 +230,22 @@ impl KeepOut<'_> {
 }
 
 impl Clearance {
-    /// Counts a use, and finds half-spaces at the second one. Uses beside it get none, instead of waiting for a thread
-    /// that may be waiting for them.
-    fn used(&self, path: Path, starts: &[u32], how: &KeepOut<'_>) -> &[HalfSpace] {
-        if self.uses.fetch_add(1, Ordering::Relaxed) == 1 {
-            let mut found = vec![HalfSpace::default(); starts.len().saturating_sub(1)];
-            parallel::for_each(found.chunks_mut(TASK_CURVES), |task, out| {
-                look_up(path, task * TASK_CURVES, starts, how, out);
-            });
-            let _ = self.half_spaces.set(found);
-        }
-        self.half_spaces.get().map_or(&[], Vec::as_slice)
+    /// Of this many curves, of which nothing is known yet.
+    pub fn of(curves: usize) -> Self {
+        Self { half_spaces: KeptHalfSpaces::of(curves) }
     }
 }
 
 kernel! {
-    fn look_up(first: usize, starts: &[u32], how: &KeepOut<'_>, out: &mut [HalfSpace]) = look_up_task;
+    fn look_up(curves: Range<usize>, starts: &[u32], how: &KeepOut<'_>, out: &mut [HalfSpace]) = look_up_task;
 }
 
 #[inline(always)]
-fn look_up_task(first: usize, starts: &[u32], how: &KeepOut<'_>, out: &mut [HalfSpace]) {
+fn look_up_task(curves: Range<usize>, starts: &[u32], how: &KeepOut<'_>, out: &mut [HalfSpace]) {
     let obstacles = [how.skin.tree];
     let collision = Collide { skin: Some(how.skin), ..how.collision(&obstacles, false) };
     let mut rest = Vec::new();
-    for (curve, out) in (first..).zip(out) {
+    for (curve, out) in curves.zip(out) {
         let cvs = starts[curve] as usize..starts[curve + 1] as usize;
         rest.resize(cvs.len(), [0.0; 3]);
         let root = to_f32(how.root(curve, cvs.start));
@@ -270,7 +263,7 @@ kernel! {
         starts: &[u32],
         points: &[Vec3],
         how: &KeepOut<'_>,
-        half_spaces: &[HalfSpace],
+        half_spaces: &KeptHalfSpaces,
     ) -> Vec<Entering> = entering_task;
 }
 
@@ -280,7 +273,7 @@ fn entering_task(
     starts: &[u32],
     points: &[Vec3],
     how: &KeepOut<'_>,
-    half_spaces: &[HalfSpace],
+    half_spaces: &KeptHalfSpaces,
 ) -> Vec<Entering> {
     let (mut entered, mut rest) = (Vec::new(), Vec::new());
     let mut nearby = Nearby::default();
@@ -322,19 +315,16 @@ fn clear_of(
     starts: &[u32],
     points: &[Vec3],
     how: &KeepOut<'_>,
-    half_spaces: &[HalfSpace],
+    half_spaces: &KeptHalfSpaces,
 ) -> u16 {
     let mut lanes = ClearLanes::none();
-    if curves.end > half_spaces.len() {
-        return 0;
-    }
     for lane in 0..curves.len() {
         let curve = curves.start + lane;
         let (first, end) = (starts[curve] as usize, starts[curve + 1] as usize);
-        if end - first >= 2 {
+        if let Some(half_space) = half_spaces.get(curve).filter(|_| end - first >= 2) {
             let root = how.root(curve, first);
             let untested = how.untested(how.is_lifted(points[first], &root));
-            lanes.put(lane, [first, end - first], &half_spaces[curve], &root, untested);
+            lanes.put(lane, [first, end - first], half_space, &root, untested);
         }
     }
     lanes.clear(points)

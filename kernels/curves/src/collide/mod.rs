@@ -15,6 +15,7 @@ mod crossing;
 mod hair;
 mod half_space;
 mod keep_out;
+mod kept_half_spaces;
 mod rest;
 mod root_lift;
 mod root_surface;

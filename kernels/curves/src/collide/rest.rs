@@ -3,19 +3,17 @@
 use super::Collide;
 use super::crossing::first_crossing;
 use super::half_space::{HalfSpace, SAME_SIDE};
+use super::kept_half_spaces::{BATCH_CURVES, KeptHalfSpaces};
 use super::root_surface::RootSurface;
 use super::segment_turn::{Nearby, gather};
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Number of successive segments that share one query of the trees.
 const GATHERED_SEGMENTS: usize = 6;
-
-/// Number of curves that are examined together.
-const BATCH_CURVES: usize = 64;
 
 /// Everything that depends only on curves, obstacles and skin at rest, not on the wind: on `obstacles`, `skin` and
 /// `offset_root` of [`Collide`], and on whether its `loft` is 0. Keep it and pass it in [`Collide::at_rest`] while these
@@ -26,8 +24,7 @@ const BATCH_CURVES: usize = 64;
 #[derive(Debug)]
 pub struct AtRest {
     batches: Vec<Batch>,
-    /// How often it was used.
-    uses: AtomicU32,
+    half_spaces: KeptHalfSpaces,
 }
 
 /// What is known of some curves.
@@ -35,10 +32,6 @@ pub struct AtRest {
 struct Batch {
     is_claimed: AtomicBool,
     grown: OnceLock<Grown>,
-    /// Found at the second use: on a skin that moves in each frame there is none, and they would cost more than they
-    /// save.
-    half_spaces: OnceLock<Vec<HalfSpace>>,
-    half_spaces_are_claimed: AtomicBool,
 }
 
 /// Curves at rest.
@@ -58,7 +51,7 @@ impl AtRest {
     /// Of this many curves, of which nothing is known yet.
     pub fn of(curves: usize) -> Self {
         let batches = (0..curves.div_ceil(BATCH_CURVES)).map(|_| Batch::default()).collect();
-        Self { batches, uses: AtomicU32::new(0) }
+        Self { batches, half_spaces: KeptHalfSpaces::of(curves) }
     }
 
     /// Examines the curves as far as that has not been done.
@@ -91,20 +84,15 @@ impl AtRest {
         }
     }
 
-    /// Counts a use, and finds half-spaces from the second one on. Those that another thread is finding are not waited for:
-    /// they save time and change no result.
+    /// Counts a use, and finds half-spaces from the second one on.
     pub(super) fn used(&self, path: Path, starts: &[u32], rest: &[Vec3], how: &Collide<'_>) {
-        let is_first = self.uses.fetch_add(1, Ordering::Relaxed) == 0;
-        if is_first || how.skin.is_none() || self.batches.iter().all(|batch| batch.half_spaces.get().is_some()) {
+        if how.skin.is_none() {
             return;
         }
-        parallel::for_each(&self.batches, |n, batch| {
-            if let Some(grown) = batch.grown.get()
-                && !batch.half_spaces_are_claimed.swap(true, Ordering::Relaxed)
-            {
-                let mut found = vec![HalfSpace::default(); grown.shifts.len()];
-                look_up(path, ends_of(n, starts), rest, how, &grown.shifts, &mut found);
-                let _ = batch.half_spaces.set(found);
+        self.half_spaces.used(|curves, found| {
+            let batch = curves.start / BATCH_CURVES;
+            if let Some(grown) = self.batches[batch].grown.get() {
+                look_up(path, ends_of(batch, starts), rest, how, &grown.shifts, found);
             }
         });
     }
@@ -127,8 +115,7 @@ impl AtRest {
     /// Number of half-spaces found so far that may free something.
     #[cfg(test)]
     pub(super) fn half_spaces_found(&self) -> usize {
-        let found = self.batches.iter().filter_map(|batch| batch.half_spaces.get());
-        found.flatten().filter(|found| **found != HalfSpace::default()).count()
+        self.half_spaces.known().filter(|found| **found != HalfSpace::default()).count()
     }
 
     /// Whether the root of each curve is nearer to the skin than the root offset, as far as that is known.
@@ -158,8 +145,7 @@ impl AtRest {
     /// The half-space of a curve, if it is known.
     #[inline]
     pub(super) fn half_space(&self, curve: usize) -> Option<&HalfSpace> {
-        let (batch, n) = self.batch(curve);
-        batch.half_spaces.get()?.get(n)
+        self.half_spaces.get(curve)
     }
 }
 

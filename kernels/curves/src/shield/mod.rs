@@ -129,6 +129,9 @@ struct Obstacle {
     edges: Option<Edges>,
     /// The longest side of its bounds.
     size: f32,
+    /// Number of triangles, unused lanes included, and the same per area of its bounds across the wind.
+    triangles: f32,
+    density: f32,
 }
 
 /// The fraction of each curve's CVs that `colliders` shelter, 0…1; a curve's CVs are
@@ -250,7 +253,9 @@ impl Obstacle {
             Some(neighbours) => Edges::of(&tree, &points, neighbours),
             None => Edges::of(&tree, &points, &Neighbours::of(&points, collider.triangles)),
         });
-        Self { tree, areas, edges, size }
+        let triangles = (LANES * tree.blocks().len()) as f32;
+        let density = triangles / ((high[0] - low[0]) * (high[1] - low[1]));
+        Self { tree, areas, edges, size, triangles, density }
     }
 }
 

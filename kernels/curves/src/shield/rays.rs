@@ -1,4 +1,5 @@
-//! Sixteen rays at once, each a lane, against one triangle after another.
+//! Sixteen rays at once, each a lane, against one triangle after another; or, where they are far apart, one ray after
+//! another against sixteen triangles.
 
 use super::views::View;
 use super::{Fade, Obstacle, Reach};
@@ -53,6 +54,10 @@ fn body_of_nearest(obstacles: &[Obstacle], views: &[View], fade: Fade, covered: 
         *covered = fade.weight(distance);
     }
 }
+
+/// Expected number of triangles between sixteen rays from which on each ray is followed alone: that takes a walk through
+/// the tree for each, but meets few triangles.
+const MANY_TRIANGLES: f32 = 160.0;
 
 /// The view of a lane.
 #[inline(always)]
@@ -124,8 +129,19 @@ impl Rays {
     /// Sets `hit` to 1 for each ray that meets the tree; returns whether all do.
     #[inline(always)]
     fn meet(&self, obstacle: &Obstacle, hit: &mut [u32; LANES]) -> bool {
-        let tree = &obstacle.tree;
-        for (block, mut lanes) in tree.walk(self.swept()) {
+        let (tree, swept) = (&obstacle.tree, self.swept());
+        let area = (swept.high[0] - swept.low[0]) * (swept.high[1] - swept.low[1]);
+        if (area * obstacle.density).min(obstacle.triangles) > MANY_TRIANGLES {
+            let mut all = true;
+            for lane in 0..LANES {
+                if hit[lane] == 0 {
+                    hit[lane] = u32::from(self.meets_alone(lane, &swept, obstacle));
+                }
+                all &= hit[lane] == 1;
+            }
+            return all;
+        }
+        for (block, mut lanes) in tree.walk(swept) {
             let (areas, [a, b, c]) = (&obstacle.areas[block], &tree.blocks()[block].corners);
             while lanes != 0 {
                 let triangle = lanes.trailing_zeros() as usize;
@@ -144,16 +160,32 @@ impl Rays {
         false
     }
 
+    /// Whether one ray meets the tree: the same tests as side by side, of those triangles only whose boxes its line meets.
+    #[inline(always)]
+    fn meets_alone(&self, lane: usize, swept: &Cuboid, obstacle: &Obstacle) -> bool {
+        let (tree, at) = (&obstacle.tree, get(&self.at, lane));
+        let (gap, reach) = (self.gap.0[lane], self.reach.0[lane]);
+        let line = Cuboid { low: at, high: [at[0], at[1], swept.high[2]] };
+        for (block, lanes) in tree.walk(line) {
+            let (areas, [a, b, c]) = (&obstacle.areas[block], &tree.blocks()[block].corners);
+            let mut met = 0;
+            for triangle in 0..LANES {
+                let corners = [get(a, triangle), get(b, triangle), get(c, triangle)];
+                met |= u16::from(meets(corners, areas.0[triangle], at, gap, reach)) << triangle;
+            }
+            if met & lanes != 0 {
+                return true;
+            }
+        }
+        false
+    }
+
     /// Sets `hit` to 1 for each ray that meets the triangle, whose area is half of `area`.
     #[inline(always)]
     fn meet_triangle(&self, corners: [Vec3; 3], area: f32, hit: &mut [u32; LANES]) {
-        let [a, b, c] = corners;
         for lane in 0..LANES {
             let at = get(&self.at, lane);
-            let seen = Seen::from([sub(a, at), sub(b, at), sub(c, at)]);
-            let far = seen.towards > self.gap.0[lane] * area;
-            let near = seen.towards <= self.reach.0[lane] * seen.across;
-            hit[lane] |= u32::from(seen.inside & far & near);
+            hit[lane] |= u32::from(meets(corners, area, at, self.gap.0[lane], self.reach.0[lane]));
         }
     }
 
@@ -170,6 +202,13 @@ impl Rays {
         }
         Cuboid { low, high }
     }
+}
+
+/// Whether the ray from `at` meets a triangle, whose area is half of `area`, farther than `gap` and within its reach.
+#[inline(always)]
+fn meets([a, b, c]: [Vec3; 3], area: f32, at: Vec3, gap: f32, reach: f32) -> bool {
+    let seen = Seen::from([sub(a, at), sub(b, at), sub(c, at)]);
+    seen.inside & (seen.towards > gap * area) & (seen.towards <= reach * seen.across)
 }
 
 /// A triangle as seen from the start of a ray along the third axis.

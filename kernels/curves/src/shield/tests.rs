@@ -242,6 +242,23 @@ fn any_input_gives_a_fraction() {
     assert!(shield(&[0], &[], &nothing, &STILL).is_empty());
 }
 
+/// Rays far apart are followed alone, those close together side by side: here the same rays among others far away, and
+/// sixteen times at one place.
+#[test]
+fn rays_see_the_same_alone_and_side_by_side() {
+    let (points, triangles) = sphere(60);
+    let colliders = [Collider::of(&points, &triangles)];
+    let at = |i: u64| [0, 1, 2].map(|axis| Key::new(8).of(i).of(axis).f32() * 3.0 - 1.5);
+    let alone: Vec<Vec3> = (0..200).map(at).collect();
+    let how = Shield { wind: [0.5, 0.4, 0.8], ..STILL };
+    let expected = shield(&lone(&alone), &alone, &colliders, &how);
+    assert!(expected.contains(&1.0) && expected.contains(&0.0));
+    for (one, expected) in alone.iter().zip(&expected) {
+        let crowd = vec![*one; LANES];
+        assert_eq!(shield(&lone(&crowd), &crowd, &colliders, &how), vec![*expected; LANES]);
+    }
+}
+
 #[test]
 fn every_simd_path_and_any_number_of_threads_gives_the_same_bits() {
     let (points, triangles) = sphere(20);

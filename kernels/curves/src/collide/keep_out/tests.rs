@@ -60,7 +60,7 @@ fn kept(mesh: &Mesh, starts: &[u32], rest: &[Vec3], goal: &[Vec3], clearance: &C
 fn hairs_blown_into_the_floor_end_on_it_and_the_others_keep_their_bits() {
     let (starts, rest, goal) = hairs(600);
     let mesh = Mesh::floor();
-    let (points, kept) = kept(&mesh, &starts, &rest, &goal, &Clearance::default());
+    let (points, kept) = kept(&mesh, &starts, &rest, &goal, &Clearance::of(600));
     let mut into = 0;
     for (hair, now) in points.chunks(CVS as usize).enumerate() {
         let goal = &goal[hair * CVS as usize..][..CVS as usize];
@@ -87,11 +87,11 @@ fn hairs_blown_into_the_floor_end_on_it_and_the_others_keep_their_bits() {
 fn half_spaces_change_no_bit() {
     let (starts, rest, goal) = hairs(600);
     let mesh = Mesh::floor();
-    let clearance = Clearance::default();
+    let clearance = Clearance::of(600);
     let first = kept(&mesh, &starts, &rest, &goal, &clearance);
-    assert!(clearance.half_spaces.get().is_none());
+    assert_eq!(clearance.half_spaces.known().count(), 0);
     let second = kept(&mesh, &starts, &rest, &goal, &clearance);
-    let known = clearance.half_spaces.get().expect("found at the second use");
+    let known: Vec<HalfSpace> = clearance.half_spaces.known().copied().collect();
     let of = |hair: usize| hair * CVS as usize..(hair + 1) * CVS as usize;
     let free = |hair: usize| known[hair].clears_curve(&to_f64(rest[of(hair).start]), &goal[of(hair)], 5e-4);
     assert!((0..600).filter(|hair| free(*hair)).count() > 300, "most hairs are free without a query");
@@ -126,12 +126,27 @@ fn a_hair_that_touches_the_skin_does_not_jump() {
     let tip = |step: u32| {
         let (sine, cosine) = libm::sincosf(1.4 + 0.005 * step as f32);
         let goal: Vec<Vec3> = (0..CVS).map(|k| STEP * k as f32).map(|r| [r * sine, r * cosine, 0.0]).collect();
-        to_f64(kept(&mesh, &[0, CVS], &rest, &goal, &Clearance::default()).0[4])
+        to_f64(kept(&mesh, &[0, CVS], &rest, &goal, &Clearance::of(1)).0[4])
     };
     // 0.4 mm a step where the hair is free.
     let largest = (0..80).map(|step| (tip(step + 1) - tip(step)).norm()).fold(0.0, f64::max);
     assert!(largest < 2e-3, "{largest}");
     assert!(tip(80).y > 0.0 && tip(80).y < 2e-3);
+}
+
+/// Frames that use half-spaces at the same time find them together, with the bits of one that is alone.
+#[test]
+fn frames_share_half_spaces() {
+    let (starts, rest, goal) = hairs(600);
+    let mesh = Mesh::floor();
+    let alone = kept(&mesh, &starts, &rest, &goal, &Clearance::of(600));
+    let clearance = Clearance::of(600);
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| assert_eq!(kept(&mesh, &starts, &rest, &goal, &clearance), alone));
+        }
+    });
+    assert_eq!(clearance.half_spaces.known().count(), 600);
 }
 
 /// One that dips into the floor at rest is turned out of it, and counted.
@@ -140,7 +155,7 @@ fn hairs_that_cross_the_skin_at_rest_are_turned_out() {
     let mesh = Mesh::floor();
     let rest = vec![[0.0, 0.01, 0.0], [0.0, 0.05, 0.0], [0.02, -0.01, 0.0], [0.3, 0.1, 0.0], [0.3, 0.2, 0.0]];
     let goal = vec![[0.0, 0.01, 0.0], [0.0, 0.05, 0.0], [0.04, -0.003_245_553, 0.0], [0.3, 0.1, 0.0], [0.3, 0.0, 0.0]];
-    let (points, kept) = kept(&mesh, &[0, 3, 5], &rest, &goal, &Clearance::default());
+    let (points, kept) = kept(&mesh, &[0, 3, 5], &rest, &goal, &Clearance::of(2));
     assert_eq!(points[..2], goal[..2]);
     assert!(points[2][1] > 0.0 && points[4][1] > 0.0 && points[4][1] < 2e-3, "{points:?}");
     assert_eq!((kept.kept_out, kept.started_inside, kept.crossings_left), (2, 1, 0));
@@ -153,11 +168,11 @@ fn hairs_with_their_roots_in_the_skin_are_lifted() {
     let mesh = Mesh::floor();
     let rest: Vec<Vec3> = (0..CVS).map(|k| [0.0, STEP * k as f32 - 0.003, 0.0]).collect();
     let goal: Vec<Vec3> = (0..CVS).map(|k| [STEP * k as f32, -0.001 * k as f32 - 0.003, 0.0]).collect();
-    let (points, found) = kept(&mesh, &[0, CVS], &rest, &goal, &Clearance::default());
+    let (points, found) = kept(&mesh, &[0, CVS], &rest, &goal, &Clearance::of(1));
     // All of the hair is below the floor, and crosses nothing.
     assert_eq!((points, found), (goal, KeptOut::default()));
     let goal: Vec<Vec3> = (0..CVS).map(|k| [STEP * k as f32, 0.001 * k as f32 - 0.003, 0.0]).collect();
-    let (points, found) = kept(&mesh, &[0, CVS], &rest, &goal, &Clearance::default());
+    let (points, found) = kept(&mesh, &[0, CVS], &rest, &goal, &Clearance::of(1));
     assert!((points[0][1] - 1e-4).abs() < 1e-6 && points[0][0] == 0.0, "{points:?}");
     assert!(points[1..].iter().all(|cv| cv[1] > 0.0 && cv[1] < 6e-3), "{points:?}");
     assert_eq!((found.kept_out, found.started_inside, found.crossings_left), (1, 0, 0));
@@ -168,14 +183,14 @@ fn hairs_with_their_roots_in_the_skin_are_lifted() {
 #[test]
 fn poses_carry_rest_shapes() {
     let (starts, rest, goal) = hairs(200);
-    let (mesh, still) = (Mesh::floor(), Clearance::default());
+    let (mesh, still) = (Mesh::floor(), Clearance::of(200));
     let expected = kept(&mesh, &starts, &rest, &goal, &still);
     let shift = DVec3::new(0.0, 8.0, 0.0);
     let moved = |points: &[Vec3]| points.iter().map(|p| to_f32(to_f64(*p) + shift)).collect::<Vec<_>>();
     let above = Mesh::of(moved(&mesh.points), mesh.triangles.clone());
     let pose = RootPose { translation: shift, rotation: numerics::vector::DQuat::identity(), lost: false };
     let poses = vec![pose; 200];
-    let clearance = Clearance::default();
+    let clearance = Clearance::of(200);
     for _ in 0..2 {
         let mut points = moved(&goal);
         let how = KeepOut { skin: above.skin(), rest: &rest, poses: Some(&poses), gap: 1e-4, clearance: &clearance };
