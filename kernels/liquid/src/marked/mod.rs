@@ -7,7 +7,7 @@
 mod tests;
 
 use numerics::parallel;
-use numerics::vector::{Vec3, add, dot, scale, sub};
+use numerics::vector::{Vec3, add, dot, scale, sub, unit};
 use serde::{Deserialize, Serialize};
 
 use crate::extract::{Placement, QuadMesh, extract};
@@ -29,10 +29,16 @@ const FACING: f32 = 0.7;
 /// diagonal of a cell.
 const FILM: f32 = 1.8;
 
-/// What φ rises in a cell above a solid: less than the first, as where a pool meets a shore, it is no film; from the second
-/// on it is.
-const WEDGE: f32 = 0.8;
-const FLAT: f32 = 0.95;
+/// What φ rises in a cell above a solid: up to the first it is no film; from the second on it is, however uneven: in grooves
+/// where lobes met φ rises by a half.
+const RISE: [f32; 2] = [0.2, 0.5];
+
+/// The same beside a shore, where a pool meets the solid, and above a thin solid, where only a film that lies flat is sure not
+/// to be of both sides.
+const RISE_OF_EVEN: [f32; 2] = [0.8, 0.95];
+
+/// Surface cells towards where liquid gets thinner in which a shore ends it, and a groove does not.
+const BESIDE: f32 = 3.0;
 
 /// Distance, in surface cells, that films on both sides of a thin solid keep from its middle.
 const APART: f32 = 0.4;
@@ -147,9 +153,11 @@ impl MarkedSurface {
             {
                 // Over a film φ rises with the height; where a surface meets the solid it does not.
                 let rise = sampler.at(add(at, normal)) - phi;
-                let wanted = ((rise - WEDGE) / (FLAT - WEDGE)).clamp(0.0, 1.0) * (FILM - thickness);
-                // Half the thickness of the solid, where that is less than a film reaches.
                 let inside = -distance(sub(at, scale(normal, height + FILM)));
+                let is_even = inside < 0.5 * FILM || is_shore(&distance, sampler, at, normal);
+                let [least, most] = if is_even { RISE_OF_EVEN } else { RISE };
+                let wanted = ((rise - least) / (most - least)).clamp(0.0, 1.0) * (FILM - thickness);
+                // Half the thickness of the solid, where that is less than a film reaches.
                 depth = wanted.min(0.5 * (FILM + inside) - APART).max(0.0);
             }
             [phi.max(-height - depth).min(BAND)]
@@ -334,6 +342,14 @@ impl Flow for Scaled<'_> {
         let held = self.flow.held(scale(from, unit), scale(way, unit), direction)?;
         Some(Held { way: scale(held.way, self.size), ..held })
     }
+}
+
+/// Whether the solid is dry [`BESIDE`] cells from a place, where the liquid on it gets thinner.
+fn is_shore(solid: &Distance<'_>, sampler: &mut PhiSampler<'_>, at: Vec3, normal: Vec3) -> bool {
+    let (_, gradient) = sampler.gradient(at);
+    let Some(along) = unit(sub(gradient, scale(normal, dot(gradient, normal)))) else { return false };
+    let beside = add(at, scale(along, BESIDE));
+    sampler.at(sub(beside, scale(normal, solid(beside)))) >= 0.0
 }
 
 /// The cells `by` times larger that hold one of `rows`.

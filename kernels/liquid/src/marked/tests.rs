@@ -59,6 +59,21 @@ fn a_film_on_a_ball_has_no_holes_and_its_volume() {
     }
 }
 
+/// Two lobes that met leave a groove, at whose foot the film is thin and its surface slopes.
+#[test]
+fn a_groove_in_a_film_on_a_ball_has_no_holes() {
+    let ball = |p: Vec3| length(sub(p, [16.1, 13.9, 16.0])) - 8.03;
+    let domain = Domain::closed([0; 3], [32; 3]);
+    for (foot, slope) in [(0.1_f32, 0.5_f32), (0.3, 0.8), (0.6, 1.2)] {
+        let steep = (1.0 + slope * slope).sqrt();
+        let film = |p: Vec3| (ball(p) - (foot + slope * (p[2] - 16.2).abs()).min(2.0)) / steep;
+        let mut surface = MarkedSurface::new(domain, 1, film, 0, 1);
+        surface.meet(&ball);
+        let mesh = surface.mesh(Some(&ball));
+        assert_eq!(mesh.points.len() as i64 - mesh.quads.len() as i64, 4, "{foot}, {slope}");
+    }
+}
+
 #[test]
 fn a_pool_around_a_ball_ends_at_it() {
     let ball = |p: Vec3| length(sub(p, [16.1, 13.9, 16.0])) - 8.03;
