@@ -294,7 +294,7 @@ def scaling(check):
     waits.write_text('#!/bin/bash\n[ "$1" = merge ] || sleep 2\n')
     cooks.write_text(f'#!/bin/bash\n[ "$1" = merge ] && exec {check.convect} "$@"\nexec {check.convect} "$@" --threads 1\n')
     waits.chmod(0o755), cooks.chmod(0o755)
-    print("| slots | parts that wait 2 s | as fast | parts that cook, one thread each | as fast |\n|---|---|---|---|---|")
+    print("| slots | parts that wait 2 s | speed-up | parts that cook, one thread each | speed-up |\n|---|---|---|---|---|")
     first = {}
     for slots in (1, 2, 4, 8, 16):
         cells = []

@@ -88,7 +88,7 @@ fn keyframes() {
         if params > 0 {
             let case = format!("{}: params with a single keyframe", node.name);
             page::record(PART, "8", &case, Outcome::Finite, &counted(params));
-            let case = format!("{}: keyframes unordered, doubled and none", node.name);
+            let case = format!("{}: keyframes out of order, doubled, and none", node.name);
             page::record(
                 PART,
                 "8",

@@ -423,11 +423,8 @@ fn ends() {
         }
         let said: Vec<String> = refused.iter().map(|(name, at, said)| format!("`{name}` {at}: {said}")).collect();
         let outcome = if refused.is_empty() { Outcome::Finite } else { Outcome::Refused };
-        let figure = format!(
-            "{accepted} ends are finite{}{}",
-            if said.is_empty() { "" } else { "; refused: " },
-            said.join("; ")
-        );
+        let figure =
+            format!("finite ends: {accepted}{}{}", if said.is_empty() { "" } else { "; refused: " }, said.join("; "));
         if accepted + refused.len() > 0 {
             page::record(
                 PART,

@@ -15,7 +15,7 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 pub(crate) enum Outcome {
     /// Finite, and every guarantee of its part is kept.
     Finite,
-    /// Finite, but something could not be met, which is published.
+    /// Finite, but something could not be met, which a metric says.
     Capped,
     /// There is a message that says what is wrong.
     Refused,
@@ -39,23 +39,25 @@ impl Outcome {
 const PARTS: [(&str, &str); 4] = [
     (
         "Every node",
-        "Each node of the catalogue with ordinary inputs, changed as the row says. Inputs that are refused are named by the \
-         node that gives them.",
+        "Each node of the catalogue with ordinary inputs, changed as the row says. A message names a refused input by the \
+         node that it comes from; \"(given)\" stands for geometry that the test gives in place of that node's.",
     ),
     (
         "Wind",
         "Fur on a ball: gusts, shielding, wind, jiggle, collision, and the nodes that attach and interpolate curves. Segments \
-         keep their lengths to 1e-5 of the curve's, roots stay, envelopes are in 0…1, and every crossing is counted.",
+         keep their lengths to 1e-5 of the curve's, roots stay, envelopes are in 0…1, and every crossing is counted (`crossings_left`).",
     ),
     (
         "Soft bodies",
-        "A block of 27 particles with each of the three integrators, over 24 frames. Every particle is looked at, not the skin \
-         alone; tets inside out, overlaps and lost volume are not more than what is published. A figure is the worst of the three.",
+        "A block of 27 particles with each of the three integrators, over 24 frames. Every particle is checked, not the skin \
+         alone; tets inside out, overlaps and lost volume are not more than the metrics say. A figure is the worst of the three \
+         integrators.",
     ),
     (
         "Liquids",
-        "A box of 12³ cells over 24 frames. Surface, particles and volume are finite and stay in the box; the volume is what came \
-         in less what went.",
+        "A box of 12³ cells over 24 frames. Surface, particles and volume are finite and stay in the box; the volume is what was \
+         there and added, minus what was removed. \"Notes\" are metrics that a note is about; `liquid_outside` \
+         alone does not make a scene capped, as most fill the box from a mesh that reaches out of it.",
     ),
 ];
 
@@ -134,7 +136,7 @@ fn cell(text: &str) -> String {
     text.replace('|', "/").replace('\n', " ")
 }
 
-/// The rows of NUMERICS B that a scene's name begins with, as in `#24: wholly inside`, or `numbers`; and the rest of its name.
+/// The rows of NUMERICS B that a scene's name begins with, as in `#24: under the ground`, or `numbers`; and the rest of its name.
 pub(crate) fn split<'a>(numbers: &'a str, name: &'a str) -> (&'a str, &'a str) {
     name.strip_prefix('#').and_then(|named| named.split_once(": ")).unwrap_or((numbers, name))
 }
@@ -159,10 +161,11 @@ pub(crate) use groups;
 
 const HEAD: &str = "# Stability at extremes
 
-Written by `cargo xtask bless stability`. Each scene is finite, or finite with something published that could not be met (capped), or
+Written by `cargo xtask bless stability`. Each scene is finite, or finite with a metric that says what could not be met (capped), or
 refused with a message; it has the same bits on one thread and on several, and takes a bounded number of iterations. `cargo test --test
 stability` runs a coarse form, with fewer frames, and fails where an outcome is worse than here; `cargo bench --bench laws -- stability`
-runs all of it. B is the row of the project's list of extremes: 1-9 numbers, 10-20 emptiness, 21-30 wind, 31-44 soft bodies, 45-54 liquids.
+runs all of it. B is the number in the project's list of extremes, by which rows are sorted: 1-9 numbers, 10-20 empty and degenerate input,
+21-30 wind, 31-44 soft bodies, 45-54 liquids.
 
 Random graphs of all nodes, with params in and out of their ranges, broken files and command lines: `cargo xtask torture`
 ([torture.md](torture.md)). Your own graph: `convect study GRAPH --extremes` ([study.md](study.md)).

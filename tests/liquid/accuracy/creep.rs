@@ -17,7 +17,7 @@ pub(super) fn figures() -> Vec<Figure> {
         Figure::error("film on a slope, 8 cells: profile up to ρg sin α H²/2μ", films[0].max(thick), 0.03, ""),
         Figure::within("its order of accuracy", &[order(films)], [1.8, 2.3]),
         Figure::error("a plate drags liquid along, cutting cells: linear profile", couette(), 0.03, ""),
-        Figure::within("a column on a smooth foot sinks, ÷ ρgH²/6μ, 10³…10⁶ Pa·s", &columns, [0.85, 1.15]),
+        Figure::within("a column on a frictionless base sinks, ÷ ρgH²/6μ, 10³…10⁶ Pa·s", &columns, [0.85, 1.15]),
         Figure::within("the same one cell thick between periodic sides, ÷ ρgH²/8μ", &sheets, [0.98, 1.02]),
         Figure::within(
             "drag of balls of 3.2 cells radius in a lattice ÷ Hasimoto's (1959)",

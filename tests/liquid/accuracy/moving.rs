@@ -21,7 +21,7 @@ pub(super) fn figures(effort: Effort) -> Vec<Figure> {
         Figure::error("its surface moves, 240 frames", off, 1e-3, " cells").has_coarse_form(effort),
         Figure::error("a stream downhill for 100 frames: speed g·t", stream(), 1e-4, ""),
         Figure::error(
-            "vortices in a smooth box of 64² cells decay at the grid's rate",
+            "vortices in a free-slip box of 64² cells decay at the rate of the grid's second difference",
             vortices(effort.choose(32, 64)),
             0.01,
             "",

@@ -247,13 +247,13 @@ impl Cooked {
 
     fn told(&self, fastest: f32, drift: f64) -> String {
         let mut told = format!(
-            "{fastest:.1} m/s, volume off by {drift:.0e}, {:.0} substeps a frame at most",
+            "{fastest:.1} m/s, volume off by {drift:.0e}, substeps a frame: at most {:.0}",
             self.most("substeps_used")
         );
         let noted: Vec<&str> =
             self.notes.iter().map(|note| note.kind).filter(|kind| self.metrics.contains_key(*kind)).collect();
         if !noted.is_empty() {
-            let _ = write!(told, "; told: {}", noted.join(", "));
+            let _ = write!(told, "; notes: {}", noted.join(", "));
         }
         told
     }

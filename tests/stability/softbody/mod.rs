@@ -94,7 +94,7 @@ impl Worst {
     fn figure(&self) -> String {
         let Self { volume, overlap, inverted, caps } = self;
         format!(
-            "volume off by {volume:.1e}, {inverted} tets inside out, overlap {overlap:.1e} m, {caps} caps hit a frame"
+            "volume off by {volume:.1e}, tets inside out: {inverted}, overlap {overlap:.1e} m, caps hit a frame: {caps}"
         )
     }
 }

@@ -33,15 +33,18 @@ pub(super) fn scenes_of_any_scale_position_and_frame_rate_stay_finite() {
             ("#9: a frame of 1 µs", at(1e6)),
             ("#9: time stands still", grounded(cube(0.02)).set("time_scale", 0)),
             ("#9: time runs a million times as fast", grounded(cube(0.02)).set("time_scale", "1e6")),
-            ("#41: gravity near the end of single precision", grounded(cube(0.02)).set("gravity", "[0, -1e37, 0]")),
+            (
+                "#41: gravity near the largest number of single precision",
+                grounded(cube(0.02)).set("gravity", "[0, -1e37, 0]"),
+            ),
         ],
     );
     refused(
         "5",
         [
-            ("features of 3 cm 1e7 m away, where 1 m is the least there is", away(1e7), "the body has no mass"),
+            ("features of 3 cm 1e7 m away, where single precision steps by 1 m", away(1e7), "the body has no mass"),
             (
-                "#9: steps end beyond single precision",
+                "#9: steps end beyond the largest number of single precision",
                 grounded(cube(0.02)).set("time_scale", "1e30"),
                 "`P` of point 0 of the mesh is NaN or infinite",
             ),

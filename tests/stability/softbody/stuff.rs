@@ -128,20 +128,20 @@ pub(super) fn bodies_move_towards_goals_that_are_unreachable_or_change_every_fra
     hold(
         "40",
         [
-            ("a kilometre away", aimed(&far, 3.0)),
-            ("a kilometre away, all pulled", aimed(&far, 3.0).set("goal_on", "\"all\"")),
-            ("the shape at rest", aimed(&body, 3.0)),
-            ("at the start", aimed(&nearer(0.1), 1.0)),
-            ("before the start", aimed(&nearer(0.1), -10.0)),
-            ("long after the end", aimed(&nearer(0.1), 1e9)),
-            ("two in one frame", aimed(&nearer(0.1), 3.0).goal(nearer(-0.1), 3.0, 1e4, 1.0)),
+            ("a goal a kilometre away", aimed(&far, 3.0)),
+            ("a goal a kilometre away, all particles pulled", aimed(&far, 3.0).set("goal_on", "\"all\"")),
+            ("a goal of the shape at rest", aimed(&body, 3.0)),
+            ("a goal at the start", aimed(&nearer(0.1), 1.0)),
+            ("a goal before the start", aimed(&nearer(0.1), -10.0)),
+            ("a goal long after the end", aimed(&nearer(0.1), 1e9)),
+            ("two goals in one frame", aimed(&nearer(0.1), 3.0).goal(nearer(-0.1), 3.0, 1e4, 1.0)),
             (
-                "one each frame",
+                "a goal in each frame",
                 aimed(&nearer(0.1), 2.0).goal(nearer(-0.1), 3.0, 1e4, 0.0).goal(nearer(0.1), 4.0, 1e4, 0.0),
             ),
-            ("its mirror image", aimed(&inside_out, 3.0).set("goal_on", "\"all\"")),
-            ("nothing but a sheet", aimed(&flat, 3.0).set("goal_on", "\"all\"").set("reset_frames", 0)),
-            ("pulled by 1e30", Scene::of(body.clone()).goal(nearer(0.1), 3.0, 1e30, 1.0)),
+            ("a goal that is its mirror image", aimed(&inside_out, 3.0).set("goal_on", "\"all\"")),
+            ("a goal that is a flat sheet", aimed(&flat, 3.0).set("goal_on", "\"all\"").set("reset_frames", 0)),
+            ("a goal that pulls by 1e30", Scene::of(body.clone()).goal(nearer(0.1), 3.0, 1e30, 1.0)),
         ],
     );
 }

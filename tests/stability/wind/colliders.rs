@@ -45,7 +45,7 @@ pub(super) fn curves_that_start_inside_a_collider_are_counted_and_do_not_get_dee
         [
             ("roots below the skin", unlifted(sunken(0.9, 0.3))),
             ("roots below the skin, lifted", sunken(0.9, 0.3)),
-            ("wholly inside", unlifted(sunken(0.2, 0.1))),
+            ("curves wholly inside the skin", unlifted(sunken(0.2, 0.1))),
             ("through three sheets", between(0.0, &[0.05, 0.15, 0.25])),
             ("between two sheets", between(0.01, &[0.0, 0.5])),
         ],
@@ -99,9 +99,9 @@ pub(super) fn extreme_steps_and_offsets_keep_the_guarantees() {
     hold(
         "7",
         [
-            ("#26: 1 step", out(r#""method": "steps", "rotation_steps": 1"#)),
+            ("#26: collision in 1 step", out(r#""method": "steps", "rotation_steps": 1"#)),
             (
-                "#26: a million steps",
+                "#26: collision in a million steps",
                 out(r#""method": "steps", "rotation_steps": 1000000"#).fur(|_| curves(&hairs(1, 2, 0.3))),
             ),
             ("#27: `offset_scale` 0", out(r#""offset_scale": 0"#)),

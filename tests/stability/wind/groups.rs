@@ -52,18 +52,21 @@ pub(super) fn clumps_of_any_numbers_hold() {
         "10",
         [
             ("without clumps", with_all(&[], "")),
-            ("odd numbers", clumped(r#""clump": "odd""#)),
-            ("all in one", clumped(r#""clump": "all", "clump_radius": 1"#)),
-            ("a radius of 1e30", clumped(r#""clump_radius": 1e30"#)),
-            ("a radius of 1e-45", clumped(r#""clump_radius": 1e-45"#)),
-            ("a huge mask", clumped(r#""clump_radius": 0.3, "clump_blend": { "value": 1, "attribute": "huge" }"#)),
+            ("clumps with odd numbers", clumped(r#""clump": "odd""#)),
+            ("all curves in one clump", clumped(r#""clump": "all", "clump_radius": 1"#)),
+            ("a clump radius of 1e30", clumped(r#""clump_radius": 1e30"#)),
+            ("a clump radius of 1e-45", clumped(r#""clump_radius": 1e-45"#)),
+            (
+                "clumps with a huge mask",
+                clumped(r#""clump_radius": 0.3, "clump_blend": { "value": 1, "attribute": "huge" }"#),
+            ),
             (
                 "clumps of curves of one CV",
                 clumped(r#""clump_radius": 1"#).fur(|_| curves(&vec![vec![[0.0, 0.5, 0.0]]; 3])),
             ),
             ("clumps of no curves", clumped(r#""clump_radius": 1"#).fur(|_| curves(&[]))),
             (
-                "1e30",
+                "clumps, fur and skin × 1e30",
                 clumped(r#""clump_radius": 1e29"#)
                     .refused(&["hairs"])
                     .with("hairs", r#""density": 1e-45"#)

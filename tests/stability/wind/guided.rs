@@ -50,7 +50,7 @@ pub(super) fn roots_inside_the_skin_and_thin_skins_are_no_trouble() {
                 posts(hairs(20, 5, 0.3)).fur(|_| moved(curves(&hairs(20, 5, 0.3)), |p| p.map(|x| 0.9 * x))),
             ),
             (
-                "wholly inside",
+                "curves wholly inside the skin",
                 posts(hairs(20, 5, 0.3)).fur(|_| moved(curves(&hairs(20, 5, 0.1)), |p| p.map(|x| 0.2 * x))),
             ),
             ("a skin that moves and turns over", posts(hairs(20, 5, 0.3)).skin(moving)),
@@ -65,12 +65,15 @@ pub(super) fn curves_of_any_shape_are_resampled() {
         "10",
         [
             ("curves resampled to 10,000 CVs", fine(r#""cvs": 10000"#)),
-            ("a spacing of 1e-4", fine(r#""spacing": 1e-4"#)),
-            ("a spacing of 1e30", fine(r#""spacing": 1e30"#)),
+            ("resampled at a spacing of 1e-4", fine(r#""spacing": 1e-4"#)),
+            ("resampled at a spacing of 1e30", fine(r#""spacing": 1e30"#)),
             ("resampled curves of one CV", fine("").fur(move |_| curves(&vec![vec![root]; 3]))),
             ("resampled curves of equal CVs", fine("").fur(move |_| curves(&vec![vec![root; 5]; 20]))),
             ("two CVs 1e30 m apart", fine("").fur(|_| curves(&[vec![[0.0; 3], [1e30, 0.0, 0.0]]]))),
-            ("denormal", fine(r#""spacing": 1e-42"#).fur(|_| curves(&[vec![[0.0; 3], [1e-41, 0.0, 0.0]]]))),
+            (
+                "resampled curves of denormal length",
+                fine(r#""spacing": 1e-42"#).fur(|_| curves(&[vec![[0.0; 3], [1e-41, 0.0, 0.0]]])),
+            ),
         ],
     );
     let counts = |row: usize| cooked[row].of(2, "fine").unwrap().runs().counts().max();

@@ -218,7 +218,7 @@ fn hold<const N: usize>(numbers: &str, rows: [(&str, Scene); N]) -> Vec<Cooked> 
                 let most = |name: &str| cooked.counts[name].iter().copied().fold(0.0, f64::max);
                 let (left, contacts) = (most("crossings_left"), most("contacts"));
                 let outcome = if left > 0.0 { Outcome::Capped } else { Outcome::Finite };
-                let figure = format!("lengths within {worst:.0e}, {contacts} contacts, {left} crossings left");
+                let figure = format!("lengths within {worst:.0e}, contacts: {contacts}, crossings left: {left}");
                 page::record(PART, numbers, case, outcome, &figure);
             }
         }

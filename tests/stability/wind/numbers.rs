@@ -119,6 +119,6 @@ pub(super) fn lengths_roots_and_bits_are_kept_at_both_ends_of_every_range() {
         }
     }
     assert!(ends > 40, "{ends}");
-    let figure = format!("{ends} ends, of which {refusals} are refused for this scene");
+    let figure = format!("{ends} ends, refused for this scene: {refusals}");
     page::record(PART, "7", "every param of the chain at both ends of its range", Outcome::Finite, &figure);
 }

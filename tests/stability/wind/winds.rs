@@ -25,21 +25,24 @@ pub(super) fn wind_from_any_direction_bends_curves_and_keeps_their_lengths() {
         "21",
         [
             (
-                "along the curves",
+                "wind along the curves",
                 blowing("[0, 1, 0]").fur(upright).with("wind", r#""wind_dir": [0, 1, 0], "noise": "none""#),
             ),
             (
-                "against them exactly",
+                "wind exactly against the curves",
                 blowing("[0, -1, 0]").fur(upright).with("wind", r#""wind_dir": [0, -1, 0], "noise": "none""#),
             ),
             (
-                "turning about in a frame",
+                "wind turning about in a frame",
                 blowing(r#"{ "keyframes": [[1, [1, 0, 0]], [2, [-1, 0, 0]], [3, [1, 0, 0.001]]] }"#),
             ),
-            ("turning about between frames", blowing(r#"{ "keyframes": [[1, [1, 0, 0]], [2.5, [-1, 0, 0.001]]] }"#)),
-            ("of length 1e-38", blowing("[1e-38, 0, 1e-38]")),
-            ("of length 1e38", blowing("[0, 1e38, 1e38]")),
-            ("all the way round at every CV", Scene::new().with("wind", r#""global_rotate": 1000"#)),
+            (
+                "wind turning about between frames",
+                blowing(r#"{ "keyframes": [[1, [1, 0, 0]], [2.5, [-1, 0, 0.001]]] }"#),
+            ),
+            ("wind vector of length 1e-38", blowing("[1e-38, 0, 1e-38]")),
+            ("wind vector of length 1e38", blowing("[0, 1e38, 1e38]")),
+            ("curves turned all the way round at every CV", Scene::new().with("wind", r#""global_rotate": 1000"#)),
         ],
     );
     assert_eq!(cooked[0].of(0, "wind").unwrap().positions(), upright(Frame::whole(1)).curves().unwrap().positions());

@@ -118,7 +118,11 @@ pub(super) fn figures() -> Vec<Figure> {
             wrong,
             rays,
         ),
-        Figure::never("values of `shielded` that are not a whole number of CVs ÷ all", broken, curves),
+        Figure::never(
+            "values of `shielded` that are not a whole number of CVs ÷ the curve's number of CVs",
+            broken,
+            curves,
+        ),
         Figure::never("values of `shielded` that change if scene and wind are mirrored", turned, curves),
     ]
 }
