@@ -71,8 +71,9 @@ impl StartMesh {
         (0..3).all(|k| low[k] as f32 <= self.low[k] && self.high[k] <= high[k] as f32)
     }
 
+    /// Whether it lies outside wholly; a mesh without points does not.
     fn misses(&self, [low, high]: [[i32; 3]; 2]) -> bool {
-        (0..3).any(|k| self.high[k] <= low[k] as f32 || high[k] as f32 <= self.low[k])
+        self.low[0] <= self.high[0] && (0..3).any(|k| self.high[k] <= low[k] as f32 || high[k] as f32 <= self.low[k])
     }
 
     fn overlaps(&self, other: &Self) -> bool {
@@ -110,9 +111,10 @@ impl StartLiquid {
             };
             let free = if colliders.is_empty() { seen } else { covered(shape, open) };
             let is_in = found.is_in(bounds);
-            let whole = found.volume.filter(|_| !is_in && !found.misses(bounds)).unwrap_or(seen);
             let share = |part: f64, whole: f64| if whole > 0.0 { 1.0 - part / whole } else { 0.0 };
-            losses.outside = losses.outside.max(share(seen, whole));
+            let whole = found.volume.filter(|_| !is_in).unwrap_or(seen);
+            let outside = if found.misses(bounds) { 1.0 } else { share(seen, whole) };
+            losses.outside = losses.outside.max(outside);
             losses.in_colliders = losses.in_colliders.max(share(free, seen));
             // Where walls and colliders take nothing, what the triangles enclose.
             let is_whole = is_in && free == seen;

@@ -82,6 +82,8 @@ fn what_is_left_out_at_the_start_is_told() {
     let half = solving(cuboid([0.75, 0.2, 0.2], [1.25, 0.7, 0.8]));
     assert!((of(half.clone(), OUTSIDE) - 0.5).abs() < 0.01 && of(half, IN_COLLIDERS) == 0.0);
     let block = || solving(cuboid([0.3; 3], [0.7; 3]));
+    let far = |second: [f32; 3]| block().input(LIQUID, cuboid(second, second.map(|x| x + 0.1)));
+    assert_eq!((of(far([5.0, 0.5, 0.5]), OUTSIDE), of(far([0.8; 3]), OUTSIDE)), (1.0, 0.0));
     let shut = block().input(COLLIDERS, cuboid([0.1; 3], [0.9; 3]));
     assert_eq!((of(shut.clone(), IN_COLLIDERS), of(shut.clone(), VOLUME_NOW), of(shut, OUTSIDE)), (1.0, 0.0, 0.0));
     let tiny = solving(cuboid([0.59; 3], [0.63; 3]));
