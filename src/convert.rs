@@ -29,7 +29,7 @@ pub struct ConvertArgs {
     /// Factor for lengths and velocities, such as 0.01 for a file in centimetres
     #[arg(long, value_name = "S", default_value_t = 1.0, hide_default_value = true, value_parser = positive)]
     scale: f64,
-    /// Frames per second, for the time in usdc, usda and json files; 24 by default, of a USD file its own
+    /// Frames per second, for the time in usdc, usda and json files [default: 24, or the USD file's own]
     #[arg(long, value_name = "N", value_parser = positive)]
     fps: Option<f64>,
     /// The prim of a USD file that is converted, with all under it: /set/fur

@@ -41,7 +41,8 @@ pub struct CookArgs {
     /// Cook only this output; repeatable
     #[arg(long = "output", value_name = "NAME")]
     outputs: Vec<String>,
-    /// Cook this node for the outputs, instead of the outputs, and keep its results in the cache, where a cook of the same outputs finds them; repeatable
+    /// Cook only this node, as far as the outputs need it, and keep its results in the cache, where a later cook of the
+    /// outputs finds them; repeatable
     #[arg(long = "node", value_name = "ID", requires = "cache", requires = "no_write")]
     nodes: Vec<String>,
     /// Folder to write to; created if missing
@@ -53,10 +54,11 @@ pub struct CookArgs {
     /// Override a param (node.param=VALUE) or a control (name=VALUE): JSON or a bare word, such as wind.noise=billow; repeatable
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Setting>,
-    /// Number of threads [default: the machine's]
+    /// Number of threads [default: as many as the machine has]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: u16,
-    /// Memory for the results that a frame needs, such as 8G; a node with which they would take more is refused, but 16 MiB are always allowed [default: half of the machine's]
+    /// Limit on the memory for the results that a frame needs, such as 8G; a node that would exceed it is refused, but
+    /// 16 MiB are always allowed [default: half of the machine's memory]
     #[arg(long, value_name = "SIZE")]
     memory: Option<Size>,
     /// Keep finished frames, states of solvers and windows, and slow results in this folder; an interrupted cook resumes from them
@@ -71,7 +73,7 @@ pub struct CookArgs {
     /// Write a report to this file as JSON: time, memory and metrics of each node; - writes it to stdout
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
-    /// Print the time of each node, and which of its steps were left out and why
+    /// Print the time of each node, and which of its stages were left out and why
     #[arg(short, long, conflicts_with = "quiet")]
     verbose: bool,
     /// Print only errors

@@ -34,10 +34,10 @@ pub struct ExplainArgs {
     /// Explain how `convect job` would cut the cook, instead of the plan
     #[arg(long, conflicts_with_all = ["frames", "outputs"])]
     job: bool,
-    /// Frames of a part [default: as `convect job` chooses]
+    /// Number of frames per part [default: as `convect job` chooses]
     #[arg(long, value_name = "N", requires = "job", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     chunk: Option<u32>,
-    /// The report of a cook of this graph, of some frames or all; what the job will take is estimated from its times
+    /// The report of a cook of some or all frames of this graph, from whose times the job's duration is estimated
     #[arg(long, value_name = "REPORT", requires = "job")]
     times: Option<PathBuf>,
     /// Estimate for these numbers of machines

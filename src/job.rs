@@ -26,8 +26,8 @@ use cut::Cut;
 pub struct JobArgs {
     /// The graph file
     graph: PathBuf,
-    /// The engine: `list` is a file of shell commands, one a line; `openjd` a template of Open Job Description; `slurm` a
-    /// script that submits the job
+    /// The engine: `list` is a file of shell commands, one per line; `openjd` an Open Job Description template; `slurm`
+    /// a script that submits the job
     #[arg(long, value_name = "ENGINE", value_parser = ["list", "openjd", "slurm"])]
     engine: String,
     /// Folder for the job's file, and with `list` and `slurm` for its results

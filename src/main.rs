@@ -19,7 +19,7 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 enum Verb {
     /// Cook a graph and write its outputs
     Cook(Box<cook::CookArgs>),
-    /// Report every fault of a graph, without cooking it
+    /// Report every fault of a graph; only its sources are cooked
     Check(check::CheckArgs),
     /// Show what a cook would do: nodes, number of calls, what is left out and why
     Explain(explain::ExplainArgs),

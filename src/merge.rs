@@ -24,12 +24,12 @@ use reports::merged;
 /// The arguments of `merge`.
 #[derive(Debug, clap::Args)]
 pub struct MergeArgs {
-    /// The folder of a job: its parts are in DIR/parts
+    /// The folder of a job: its parts are in FOLDER/parts
     folder: PathBuf,
     /// Merge only this output; repeatable
     #[arg(long = "output", value_name = "NAME")]
     outputs: Vec<String>,
-    /// The frames that must be there; without it, those from the first to the last of the parts
+    /// The frames that must be present [default: from the first to the last frame of the parts]
     #[arg(long, value_name = "A-B", allow_hyphen_values = true)]
     frames: Option<PartRange>,
     /// Write one usdc file for each output, instead of a stage that reads the parts as value clips

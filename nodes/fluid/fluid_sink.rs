@@ -10,9 +10,9 @@ inputs! { INPUTS:
 
 params! { PARAMS:
     RATE: Param<f32> = Param::float("rate", 0.0,
-        "Volume of liquid taken in a second, as long as there is liquid in the shape. 0 takes all that enters.")
+        "Volume of liquid removed per second, while there is liquid in the shape. 0 removes all that enters.")
         .unit(Unit::CubicMetresPerSecond).at_least(0.0).soft(0.0, 0.01);
-    ACTIVE: Param<bool> = Param::bool("active", true, "Whether it takes liquid.");
+    ACTIVE: Param<bool> = Param::bool("active", true, "Whether the sink removes liquid.");
 }
 
 const SINK: Output = Output::like("sink", &SHAPE, "The shape, with the attributes of a sink.");
@@ -20,7 +20,7 @@ const SINK: Output = Output::like("sink", &SHAPE, "The shape, with the attribute
 pub(crate) static NODE: Node = Node::new(
     "Fluid_Sink",
     1,
-    "Turns a closed mesh into a sink of liquid for FluidSolve, which takes liquid at a rate, or all that enters.",
+    "Turns a closed mesh into a sink for FluidSolve. The sink removes liquid at a rate, or removes all that enters it.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)

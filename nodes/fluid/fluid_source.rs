@@ -8,30 +8,33 @@ use engine::prelude::*;
 use crate::shared::attributes::{SOURCE_ACTIVE, SOURCE_DENSITY, SOURCE_RATE, SOURCE_VELOCITY, SOURCE_VISCOSITY};
 
 inputs! { INPUTS:
-    SHAPE: Input = Input::one("shape", Kind::Mesh, "A closed mesh. It may move, but is not swept: what a fast one \
-        passes between two substeps stays dry. It may also give the shape of the liquid at the start: wire this node to `liquid` \
-        of FluidSolve then.");
+    SHAPE: Input = Input::one("shape", Kind::Mesh, "A closed mesh. It may move, but is not swept: space that a fast \
+        source passes between two substeps gets no liquid. It may also give the shape of the liquid at the start: wire \
+        this node to `liquid` of FluidSolve then.");
 }
 
 params! { PARAMS:
     RATE: Param<f32> = Param::float("rate", 0.0,
-        "Volume of liquid added in a second, from the first frame on. 0 keeps the shape full, and publishes what that took; to \
-         stop a source, animate `active`. A rate below section · `velocity` comes from the middle of the shape, as a thinner \
-         stream of that velocity; a higher one also pushes liquid out around it. Where liquid has nowhere to go, as in a sealed \
+        "Volume of liquid added per second, from the first frame on. 0 keeps the shape full, and `sourced` counts what that adds; to \
+         stop a source, animate `active`. A rate below cross-section · `velocity` leaves the middle of the shape as a thinner \
+         stream of that velocity; a higher rate also pushes liquid out around the shape. Where liquid has nowhere to go, as in a sealed \
          box, the source gives less, and a note says so.")
         .unit(Unit::CubicMetresPerSecond).at_least(0.0).soft(0.0, 0.01);
     VELOCITY: Param<Option<[f32; 3]>> = Param::optional_vec3("velocity",
-        "Velocity of the liquid inside the shape, as of a nozzle. If it is not given, liquid leaves the shape as gravity and \
-         pressure move it. Where `rate` at this velocity would be a stream thinner than two cells, it is lower, so that the \
-         stream does not break into drops.")
+        "Velocity of the liquid inside the shape, as in a nozzle, in m/s. If it is not given, liquid leaves the shape as \
+         gravity and pressure move it. Where `rate` at this velocity would give a stream thinner than two cells, the \
+         velocity is reduced so that the stream does not break into drops.")
         .unit(Unit::MetresPerSecond);
     VISCOSITY: Param<Option<f32>> = Param::optional_float("viscosity",
-        "Dynamic viscosity of the liquid from this source, or of the liquid at the start. If it is not given, it is that of FluidSolve. Liquids of different viscosity do not mix.")
+        "Dynamic viscosity, in Pa·s, of the liquid from this source, or of the liquid at the start. By default \
+            FluidSolve's `viscosity`. Liquids of different viscosity do not mix.")
         .unit(Unit::PascalSeconds).at_least(0.0).soft(0.0, 1e3);
     DENSITY: Param<Option<f32>> = Param::optional_float("density",
-        "Mass per volume of the liquid from this source, or of the liquid at the start. If it is not given, it is that of FluidSolve.")
+        "Mass per volume, in kg/m³, of the liquid from this source, or of the liquid at the start. By default \
+            FluidSolve's `density`.")
         .unit(Unit::KilogramsPerCubicMetre).above(0.0).soft(100.0, 3000.0);
-    ACTIVE: Param<bool> = Param::bool("active", true, "Whether liquid comes from it. Animate it to start and stop a pour.");
+    ACTIVE: Param<bool> = Param::bool("active", true, "Whether the source adds liquid. Animate this to start and stop a \
+        pour.");
 }
 
 const SOURCE: Output = Output::like("source", &SHAPE, "The shape, with the attributes of a source.");

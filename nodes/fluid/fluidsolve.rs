@@ -43,21 +43,21 @@ choice! {
 choice! {
     /// When pressure and viscosity are solved together.
     Stokes for Coupling {
-        Coupling::Auto => "auto": "where viscosity changes what the grid shows",
+        Coupling::Auto => "auto": "where viscosity is large enough to change the result on this grid",
         Coupling::On => "on": "wherever there is viscosity",
-        Coupling::Off => "off": "never: pressure, then viscosity, then pressure again; for comparison, as liquid sags 1.4 to 2 times too fast",
+        Coupling::Off => "off": "never; pressure, viscosity and pressure again are solved in turn. For comparison only: liquid sags 1.4 to 2 times too fast",
     }
 }
 
 inputs! { INPUTS:
     LIQUID: Input<Many> = Input::many("liquid", Kind::Mesh,
-        "Closed meshes full of liquid at the start. Those from Fluid_Source may have a viscosity and a density of their own; where \
-         two meshes overlap, that of the later one counts.").read_at(|_| Times::START);
+        "Closed meshes full of liquid at the start. Those from Fluid_Source may have their own viscosity and density; \
+         where two meshes overlap, the one later in the list applies.").read_at(|_| Times::START);
     SOURCES: Input<Many> = Input::many("sources", Kind::Mesh,
-        "Shapes from Fluid_Source that liquid comes from. A mesh without its attributes is kept full.")
+        "Shapes from Fluid_Source that add liquid. A mesh without source attributes is kept full.")
         .read_at(|_| Times::START.and(Times::within_step(SAMPLES)));
     SINKS: Input<Many> = Input::many("sinks", Kind::Mesh,
-        "Shapes from Fluid_Sink that liquid drains into. A mesh without its attributes takes all that enters.")
+        "Shapes from Fluid_Sink that liquid drains into. A mesh without sink attributes removes all that enters.")
         .read_at(|_| Times::within_step(SAMPLES));
     COLLIDERS: Input<Many> = Input::many("colliders", Kind::Mesh,
         "Meshes that liquid does not enter. They may move and deform. Sheets and thin plates do not leak; they displace liquid as if \
@@ -65,7 +65,7 @@ inputs! { INPUTS:
         .read_at(|_| Times::NOW.and(Times::START).and(Times::within_step(1)));
     TRACERS: Input<Many> = Input::many("tracers", Kind::Points,
         "Points that the liquid carries along, substep by substep, from where they are at the start. They come out in \
-         `particles` with their attributes. Those in the air stay where they are until liquid comes.").read_at(|_| Times::START);
+         `particles` with their attributes. Those outside the liquid stay where they are until liquid reaches them.").read_at(|_| Times::START);
 }
 
 params! { PARAMS:
@@ -73,15 +73,15 @@ params! { PARAMS:
         .unit(Unit::Frame).default_scene_start().fixed();
     METHOD: Param<Method> = Param::choice("method", Method::LevelSet, "How the liquid is represented.").fixed();
     CELL: Param<f64> = Param::double("cell", 0.02,
-        "Side of a cell. Details smaller than two cells are lost; half the side takes about 12 times as long.")
+        "Edge length of a cell. Details smaller than two cells are lost; halving it takes up to 12 times as long.")
         .unit(Unit::Metres).above(0.0).soft(0.005, 0.1).fixed();
     DOMAIN_FROM: Param<[f64; 3]> = Param::dvec3("domain_from", [-0.5, 0.0, -0.5],
         "Lowest corner of the box that the liquid stays in.").unit(Unit::Metres).fixed();
     DOMAIN_TO: Param<[f64; 3]> = Param::dvec3("domain_to", [0.5, 1.0, 0.5],
-        "Highest corner of that box. A side that is no multiple of `cell` grows to the next one. Time and memory depend on the \
-         liquid, not on the box.").unit(Unit::Metres).fixed();
+        "Highest corner of that box. A side that is not a multiple of `cell` is rounded up to one. Time and memory \
+         depend on the liquid, not on the box.").unit(Unit::Metres).fixed();
     FOLLOW: Param<bool> = Param::bool("follow", false,
-        "Whether the box grows with the liquid; it has no walls then.").fixed();
+        "Whether the box grows with the liquid. If true, the box has no walls.").fixed();
     WALL_X_MIN: Param<Walls> = Param::choice("wall_x_min", domain::CLOSED, "The wall at the lowest x.").fixed().when(has_walls);
     WALL_X_MAX: Param<Walls> = Param::choice("wall_x_max", domain::CLOSED, "The wall at the highest x.").fixed().when(has_walls);
     WALL_Y_MIN: Param<Walls> = Param::choice("wall_y_min", domain::CLOSED, "The floor.").fixed().when(has_walls);
@@ -100,32 +100,35 @@ params! { PARAMS:
     SURFACE_TENSION: Param<f64> = Param::double("surface_tension", 0.0, "Surface tension; not available yet.")
         .unit(Unit::NewtonsPerMetre).at_least(0.0).soft(0.0, 0.1);
     SLIP: Param<f32> = Param::float("slip", 0.0,
-        "How freely liquid slides along `closed` walls and colliders: 0 sticks, 1 slides without friction. It has no effect where \
-         viscosity is not solved for; `explain` says where it is.").within(0.0, 1.0);
-    STOKES: Param<Stokes> = Param::choice("stokes", Coupling::Auto, "When pressure and viscosity are solved together. One after the other, thick liquid falls and turns as it should, but \
-         sags, buckles and coils at the wrong rate.");
+        "How freely liquid slides along `closed` walls and colliders: 0 sticks, 1 slides without friction. It has no \
+         effect where viscosity is not solved for; `convect explain` says where viscosity is solved for.").within(0.0, 1.0);
+    STOKES: Param<Stokes> = Param::choice("stokes", Coupling::Auto, "When pressure and viscosity are solved together. \
+         Solved one after the other, thick liquid falls and rotates correctly, but sags, buckles and coils at the wrong \
+         rate.");
     CFL: Param<f64> = Param::double("cfl", 2.0,
-        "Cells that liquid moves in a substep, at most; the fastest ten-thousandth of it up to twice as many. Smaller values are \
-         more accurate and take longer.")
+        "Maximum number of cells that liquid travels in a substep; the fastest 0.01 % of it may travel twice as many. \
+         Smaller values are more accurate and take longer.")
         .above(0.0).soft(0.5, 5.0);
     MAX_SUBSTEPS: Param<i64> = Param::int("max_substeps", 32,
-        "Most substeps of a frame. Where `cfl` asks for more, they are longer, and less accurate.").within(1.0, 4096.0).soft(1.0, 64.0);
+        "Maximum number of substeps per frame. Where `cfl` asks for more, substeps are longer and less accurate.").within(1.0, 4096.0).soft(1.0, 64.0);
     TOLERANCE: Param<f64> = Param::double("tolerance", 1e-4,
         "Largest share of a cell's volume that a substep may gain or lose, and largest error of a velocity relative to what a \
          substep changes.")
         .within(1e-9, 0.1).soft(1e-6, 1e-2);
     VOLUME_CORRECTION: Param<bool> = Param::bool("volume_correction", true,
-        "Whether the surface is moved slightly in each frame so that the volume of each piece of liquid stays what it should be.");
-    FLIP: Param<f32> = Param::float("flip", 0.0, "Share of FLIP of the particle method; not available yet.").within(0.0, 1.0);
+        "Whether the surface is moved slightly in each frame so that each separate piece of liquid keeps its correct \
+            volume.");
+    FLIP: Param<f32> = Param::float("flip", 0.0, "Share of FLIP in the particle method's velocity update; not available \
+        yet.").within(0.0, 1.0);
     PARTICLES_PER_CELL: Param<i64> = Param::int("particles_per_cell", 8,
-        "Particles of a cell in the particle method; not available yet.").within(1.0, 64.0);
+        "Particles per cell in the particle method; not available yet.").within(1.0, 64.0);
     INITIAL_VELOCITY: Param<[f64; 3]> = Param::dvec3("initial_velocity", [0.0; 3], "Velocity of the liquid at the start.")
         .unit(Unit::MetresPerSecond).fixed();
     INITIAL_SPIN: Param<[f64; 3]> = Param::dvec3("initial_spin", [0.0; 3],
-        "Rotation of the liquid at the start, in radians per second about axes through its centre of mass.")
+        "Angular velocity of the liquid at the start, in radians per second, about its centre of mass.")
         .unit(Unit::PerSecond).fixed();
     RESOLUTION: Param<i64> = Param::int("resolution", 1,
-        "Cells of the surface along a side of `cell`: 2 keeps finer detail of the surface at the same motion.")
+        "Number of surface cells per edge of a cell: 2 keeps finer surface detail; the motion is the same.")
         .within(1.0, 4.0).fixed();
     TIME_SCALE: Param<f64> = Param::double("time_scale", 1.0,
         "Simulated seconds per second of the scene: 0.5 is slow motion, 0 stops time.").at_least(0.0).soft(0.0, 2.0).history();
@@ -134,16 +137,18 @@ params! { PARAMS:
 const SURFACE: Output = Output::new(
     "surface",
     &[Kind::Mesh],
-    "The surface of the liquid: closed, with `N`, `v` and `thickness`; the same as Fluid_Surface makes of `volume`.",
+    "The surface of the liquid: closed, with `N`, `v` and `thickness`; the same mesh that Fluid_Surface makes from \
+        `volume`.",
 );
 const PARTICLES: Output = Output::new(
     "particles",
     &[Kind::Points],
-    "The markers on the surface (`kind` 0), drops too small for the grid (`kind` 1) and tracers (`kind` 3), with `id`, `v`, `N`, \
-     `volume`, `viscosity`, `density`, and the floats that came with the points of `liquid`, `sources` and `tracers`.",
+    "The markers on the surface (`kind` 0), drops too small for the grid (`kind` 1) and tracers (`kind` 3), with `id`, \
+     `v`, `N`, `volume`, `viscosity`, `density`, and the float attributes on the points of `liquid`, `sources` and \
+     `tracers`.",
 );
 const VOLUME: Output =
-    Output::new("volume", &[Kind::Volume], "The level set and the velocity, which goes on past the surface.");
+    Output::new("volume", &[Kind::Volume], "The level set and the velocity, which is extrapolated beyond the surface.");
 
 metrics! { METRICS:
     SUBSTEPS_USED = Metric::new("substeps_used", Unit::None, "Substeps of the frame.");
@@ -151,83 +156,89 @@ metrics! { METRICS:
         .warn_above(64.0, "Liquid that moves more than 64 cells in a substep ends anywhere, and is lost. Look for a velocity, spin, \
             gravity or rate that is too high; or raise `max_substeps`, or `cell`.");
     CAPS_HIT = Metric::new("caps_hit", Unit::None,
-        "Substeps that were longer than `cfl` allows because of `max_substeps`, and solves that ended before `tolerance`.");
+        "Substeps that were longer than `cfl` allows because of `max_substeps`, plus solves that stopped without \
+            reaching `tolerance`. 0 is good.");
     LONG_SUBSTEPS = Metric::new("long_substeps", Unit::None, "Substeps that were longer than `cfl` allows because of `max_substeps`.")
         .warn_above(0.0, "Liquid moves {cfl_reached} cells in a substep, more than `cfl`. Raise `max_substeps`, or `cell`.");
-    SOLVES_CUT_SHORT = Metric::new("solves_cut_short", Unit::None, "Solves that ended before `tolerance`.")
+    SOLVES_CUT_SHORT = Metric::new("solves_cut_short", Unit::None, "Solves that stopped without reaching `tolerance`.")
         .warn_above(0.0, "Velocities are off by {coupled_residual} of the speed, net flows of cells by {pressure_residual}. Raise \
             `tolerance` or `cell`, or bring the viscosities of the liquids closer together.");
     PRESSURE_ITERATIONS = Metric::new("pressure_iterations", Unit::None, "Iterations of the pressure solves.");
     PRESSURE_RESIDUAL = Metric::new("pressure_residual", Unit::None,
-        "Largest net flow of a cell that a pressure solve left, relative to the speed.");
+        "Largest net flow into or out of a cell after a pressure solve, relative to the liquid's largest speed.");
     COUPLED_ITERATIONS = Metric::new("coupled_iterations", Unit::None,
         "Iterations of the solves for pressure and viscosity together.");
     COUPLED_RESIDUAL = Metric::new("coupled_residual", Unit::None,
-        "Largest error of a velocity that such a solve left, as it estimates, relative to the speed.");
+        "Largest error of a velocity after such a solve, as the solver estimates it, relative to the liquid's largest speed.");
     VISCOSITY_ITERATIONS = Metric::new("viscosity_iterations", Unit::None,
         "Iterations of the solves for viscosity alone, where `stokes` is off.");
     VISCOSITY_RESIDUAL = Metric::new("viscosity_residual", Unit::None,
-        "Largest error of a velocity that such a solve left, as it estimates, relative to the speed.");
+        "Largest error of a velocity after such a solve, as the solver estimates it, relative to the liquid's largest speed.");
     MAX_DIVERGENCE = Metric::new("max_divergence", Unit::None,
         "The largest share of a cell's volume that a substep gained or lost.")
         .warn_above(1e-2, "Cells gain or lose more than a hundredth of their volume in a substep. Lower `tolerance`; see whether \
             colliders squeeze liquid that cannot get away.");
-    VOLUME_NOW = Metric::new("volume", Unit::CubicMetres, "Volume of the liquid, as the surface encloses it outside colliders.");
+    VOLUME_NOW = Metric::new("volume", Unit::CubicMetres, "Volume that the surface encloses, without the parts inside \
+        colliders.");
     VOLUME_DRIFT_RAW = Metric::new("volume_drift_raw", Unit::None,
-        "Error of the volume, relative to what it should be, if it were never corrected.");
+        "Relative error that the volume would have if it had never been corrected.");
     MADE_GOOD = Metric::new("volume_made_good", Unit::Percent,
-        "What moving the surface has made good since the start, in per cent of the volume.")
+        "Volume that correction has added or removed since the start, in percent of the volume.")
         .warn_last_above(10.0, "`volume_correction` has made good {volume_made_good} % of the liquid's volume by this frame, {made_good_now} \
             % in the frame alone. The volume as a whole is right, but some parts of the liquid are too thick and others too thin. What is \
             lost are drops, sheets and jets of less than two cells, and what overlaps where surfaces meet; a smaller `cell` helps \
             where liquid stays smooth, not in a splash, which only becomes finer with it.");
     MADE_GOOD_NOW = Metric::new("made_good_now", Unit::Percent,
-        "What moving the surface made good in the frame, in per cent of the volume.");
-    VOLUME_DRIFT = Metric::new("volume_drift", Unit::None, "Error of the volume that is left, relative to what it should be.")
+        "Volume that correction added or removed in the frame, in percent of the volume.");
+    VOLUME_DRIFT = Metric::new("volume_drift", Unit::None, "Relative error of the volume that remains after correction.")
         .warn_outside(-0.01, 0.01, "The volume of the liquid is off by more than a hundredth at these frames. With \
             `volume_correction` the surface moves by a tenth to half a cell in a frame to make it good, where there is room: drops and \
             thin films take several frames, and where a box is full or colliders enclose the liquid, it stays off. Without \
             `volume_correction` it stays off, too.");
     VOLUME_BALANCE = Metric::new("volume_balance", Unit::None,
-        "`volume`, `spray`, `sunk` and `left_domain` together, relative to what there was at the start and `sourced`: 0 where all \
-            of it is somewhere.")
+        "Relative difference between `volume` + `spray` + `sunk` + `left_domain` and the volume at the start + \
+            `sourced`: 0 if no volume is unaccounted for.")
         .warn_outside(-0.01, 0.01, "Liquid was lost or gained: the sum of all volumes is off by {volume_balance} of what there should be. There are \
             {volume} m³ of liquid, {spray} of spray, {sunk} sunk, {left_domain} left, {sourced} sourced. Raise `resolution`, or lower \
             `cell` where colliders or sheets of liquid are thinner than two cells.");
     MATERIAL_DRIFT = Metric::new("material_drift", Unit::None,
-        "Where liquids of several viscosities or densities meet: the largest error of the share that one of them has of the \
-            volume, relative to what it should be.")
+        "Where liquids of several viscosities or densities meet: the largest relative error of any one liquid's share of \
+            the volume.")
         .warn_outside(-1.0, 0.1, "One of the liquids of different viscosity or density is off by {material_drift} of the volume that it \
             should have: others took its place, or it took theirs. A layer thinner than a cell mixes with what is around it; use \
             smaller cells.");
     SPRAY = Metric::new("spray", Unit::CubicMetres,
-        "Volume of drops too small for the grid, which fly on their own as `spray` in `particles`.");
+        "Volume of drops too small for the grid, which fly on their own (`kind` 1 in `particles`).");
     EULER_CHARACTERISTIC = Metric::new("euler_characteristic", Unit::None,
-        "Points less edges plus faces of the surface: 2 for each closed surface, bubbles included, less 2 for each hole through it.");
+        "Points minus edges plus faces of the surface: 2 for each closed surface, bubbles included, minus 2 for each \
+            hole through it.");
     LIQUID_CELLS = Metric::new("liquid_cells", Unit::None, "Cells with liquid.");
-    SOURCED = Metric::new("sourced", Unit::CubicMetres, "Volume that sources gave since the start.");
-    SUNK = Metric::new("sunk", Unit::CubicMetres, "Volume that sinks took since the start.");
-    PARTICLES_NOW = Metric::new("particles", Unit::None, "Points of the output `particles`.");
-    COLLIDER_FORCE_X = Metric::new("collider_force_x", Unit::Newtons, "Force of the liquid on all colliders along x, mean of the frame.");
+    SOURCED = Metric::new("sourced", Unit::CubicMetres, "Volume that sources have added since the start.");
+    SUNK = Metric::new("sunk", Unit::CubicMetres, "Volume that sinks have removed since the start.");
+    PARTICLES_NOW = Metric::new("particles", Unit::None, "Number of points in the output `particles`.");
+    COLLIDER_FORCE_X = Metric::new("collider_force_x", Unit::Newtons, "Total force of the liquid on all colliders along \
+        x, averaged over the frame.");
     COLLIDER_FORCE_Y = Metric::new("collider_force_y", Unit::Newtons, "The same along y.");
     COLLIDER_FORCE_Z = Metric::new("collider_force_z", Unit::Newtons, "The same along z.");
     WITHHELD = Metric::new("withheld", Unit::CubicMetres,
-        "Volume that the rates of sources and sinks asked for in the frame and that could not pass.")
+        "Volume that the rates of sources and sinks asked for in the frame but that could not be added or removed.")
         .warn_above(1e-9, "Sources could not give, or sinks not take, what their rates ask for, most of it \
             {sources+sinks:withheld_wire}: the liquid has nowhere to go, or there is none to take. Open a wall, \
             make room, or move the source or sink.");
     WITHHELD_WIRE = Metric::new("withheld_wire", Unit::None,
-        "The wire of which most was withheld in the frame, counted from 0 through `sources`, then `sinks`.");
+        "The wire with the most withheld volume in the frame, counted from 0 through `sources`, then `sinks`.");
     COLLECTING = Metric::new("collecting", Unit::None,
-        "Sources that gave nothing in the frame because their rate is less than the grid can show.")
+        "Sources that added nothing in the frame because their rate is too small for the grid: it is collected over \
+            several frames.")
         .warn_above(0.0, "What the rates of these sources give in a frame is less than the smallest drop that cells show, a ball of one \
             cell's radius, so it is collected until it is as much. Raise `rate`, or lower `cell`; where drops go on to come in \
             pulses, give the source a `velocity` of at most `rate` ÷ 3 cell².");
-    MISWIRED = Metric::new("miswired", Unit::None, "Wires of `sources` from a Fluid_Sink, and of `sinks` from a Fluid_Source.")
+    MISWIRED = Metric::new("miswired", Unit::None, "Wires from a Fluid_Sink to `sources`, and from a Fluid_Source to \
+        `sinks`.")
         .warn_above(0.0, "A Fluid_Sink at `sources` gives liquid, and a Fluid_Source at `sinks` takes all that enters it. Wire each to \
             the input that it is made for.");
     OUTSIDE = Metric::new("liquid_outside", Unit::None,
-        "Largest share of a mesh at `liquid` that lay outside the box at the start, and was left out.")
+        "Largest share of any mesh wired to `liquid` that lay outside the box at the start, and was left out.")
         .warn_last_above(0.01, "Part of a mesh at `liquid` lies outside the box, and was left out. If that is not meant, move the mesh, \
             or make the box larger with `domain_from` and `domain_to`.");
     IN_COLLIDERS = Metric::new("liquid_in_colliders", Unit::None,

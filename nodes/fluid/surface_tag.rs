@@ -15,8 +15,9 @@ use crate::shared::attributes::{
 };
 
 inputs! { INPUTS:
-    SURFACE: Input = Input::one("surface", Kind::Mesh, "The mesh that gets the attributes, such as `surface` of FluidSolve or \
-        a Fluid_Surface. With `N`, a vertex takes values from points that face its way alone.");
+    SURFACE: Input = Input::one("surface", Kind::Mesh, "The mesh that gets the attributes, such as `surface` of \
+        FluidSolve or a Fluid_Surface. If the mesh has `N`, a vertex takes values only from points that face the same \
+        way.");
     REFERENCE: Input = Input::one("reference", Kind::Points, "The points that have the attributes, such as `particles` of \
         FluidSolve.");
 }
@@ -25,39 +26,41 @@ choice! {
     /// Which of the reference points count.
     enum ReferencePoints {
         All = "all": "all points except spray",
-        Markers = "markers": "markers on the surface, `kind` 0, which have what came with `liquid` and `sources`",
-        Tracers = "tracers": "tracers, `kind` 3, which have what came with `tracers`",
+        Markers = "markers": "markers on the surface, `kind` 0, which carry the attributes of `liquid` and `sources`",
+        Tracers = "tracers": "tracers, `kind` 3, which carry the attributes of `tracers`",
     }
 }
 
 params! { PARAMS:
     RADIUS: Param<f32> = Param::float("radius", 0.0,
-        "Distance within which points count, less the farther away they are. Larger is smoother and takes longer. 0 takes about \
-         two spacings of the points.").unit(Unit::Metres).at_least(0.0).soft(0.0, 0.1);
+        "Distance within which points count, less the farther away they are. Larger is smoother and slower. 0 uses about \
+         twice the spacing of the points.").unit(Unit::Metres).at_least(0.0).soft(0.0, 0.1);
     ATTRIBUTES: Param<Arc<Vec<Name>>> = Param::texts("attributes", &["uvw"],
-        "Names of the attributes to take over, of one, three or four floats each, such as [\"uvw\", \"Cd\"].").fixed();
+        "Names of the attributes to transfer, of one, three or four floats each, such as [\"uvw\", \"Cd\"].").fixed();
     POINTS: Param<ReferencePoints> = Param::choice("points", ReferencePoints::All,
-        "Which points of FluidSolve's `particles` count. Choose those that your attributes came with; the others have 0 instead, \
-         or white for `Cd`. \"tracers\" needs points at `tracers` of FluidSolve. Points without `kind` all count.");
+        "Which points of FluidSolve's `particles` count. Choose the kind that carries your attributes; points of other \
+         kinds have 0 there, or white for `Cd`. \"tracers\" needs points at `tracers` of FluidSolve. Points without \
+         `kind` all count.");
 }
 
 const TAGGED: Output = Output::like(
     "surface",
     &SURFACE,
-    "The mesh with the attributes, and with `Pref`: that of the points, or \
-    where they lie if they have none.",
+    "The mesh with the attributes, and with `Pref`, taken from the points' `Pref`, or from their positions if they have \
+    none.",
 );
 
 metrics! { METRICS:
     UNTAGGED_VERTICES = Metric::new("untagged_vertices", Unit::None,
-        "Vertices with no point of their side within the radius; they have the values of the nearest point.")
+        "Vertices with no point within the radius that faces their way; they get the values of the nearest point.")
         .warn_above(0.0, "These vertices have no point of their side within the radius of {tag_radius} m, so they have the \
             values of the nearest point, which may jump from frame to frame; often they lie unseen against a collider. Where \
             it shows, raise `radius`, or give more points there.");
     NO_TRACERS = Metric::new("no_tracers", Unit::None, "1 where `points` asks for tracers and `reference` has none.")
         .warn_above(0.0, "`points` is \"tracers\", but `reference` has none: wire points to `tracers` of FluidSolve, or set `points` to \
             \"markers\". The attributes are 0 meanwhile, or white for `Cd`.");
-    TAG_RADIUS = Metric::new("tag_radius", Unit::Metres, "The radius: `radius`, or what suits the spacing of the points.");
+    TAG_RADIUS = Metric::new("tag_radius", Unit::Metres, "The radius used: `radius`, or if that is 0 the one chosen from \
+        the point spacing.");
 }
 
 pub(crate) static NODE: Node = Node::new(

@@ -30,8 +30,9 @@ params! { PARAMS:
     ATTRIBUTES: Param<Arc<Vec<Name>>> = Param::texts("attributes", &[], "Names of the attributes.").fixed();
     FROM: Param<From> = Param::choice("from", From::Points, "Whether they are attributes of points or of elements.").fixed();
     RADIUS: Param<f32> = Param::float("radius", 0.0,
-        "Distance within which values are averaged, the nearer the more; of whole numbers the nearest counts. What is \
-         farther from all of `source` keeps its value. 0 takes the nearest value, however far it is.")
+        "Distance within which values are averaged, the nearer the more; for integer attributes the nearest value is \
+         used. Points or elements farther from all of `source` keep their values. 0 uses the nearest value at any \
+         distance.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 1.0);
 }
 

@@ -42,15 +42,16 @@ params! { PARAMS:
         "Number of nearest guides that a curve follows: 1 makes tufts around the guides, more make a smoother coat.")
         .within(1.0, MAX_GUIDES as f64).soft(1.0, 8.0);
     RADIUS: Param<f32> = Param::float("radius", 0.0,
-        "Distance from a guide's root up to which curves follow it, less and less towards it; curves farther from all \
-         guides only follow the skin. 0 lets every curve follow its nearest guides, however far they are.")
+        "Distance from a guide's root up to which curves follow the guide, less and less towards that distance; curves \
+         farther from all guides only follow the skin. 0 lets every curve follow its nearest guides, however far they \
+         are.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 1.0);
     BLEND: Param<Maskable> = Param::maskable("blend", 1.0,
         "How much of the guides' turn is followed: 0 only carries curves along with their roots, 1 turns them as the \
          guides turn. Lengths are kept at any value.").within(0.0, 1.0);
     KEEP_OUT: Param<bool> = Param::bool("keep_out", true,
-        "Keeps curves out of the skin that would enter it because their guides are some way off. Roots of curves that \
-         cross it at rest are lifted out of it first.");
+        "Keeps curves from entering the skin where their guides are some way off. Curves that cross the skin at rest \
+         first have their roots lifted out of it.");
 }
 
 const OUT: Output = Output::like("curves", &CURVES, "The groom, deformed as the guides are. Lengths are kept.");
@@ -58,18 +59,18 @@ const OUT: Output = Output::like("curves", &CURVES, "The groom, deformed as the 
 metrics! { METRICS:
     KEPT_OUT = Metric::new("kept_out", Unit::None, "Curves that would have entered the skin.");
     CROSSINGS_LEFT = Metric::new("crossings_left", Unit::None,
-        "Segments of curves kept out of the skin that cross it nevertheless.")
+        "Segments that still cross the skin although `keep_out` is on.")
         .warn_above(0.0, "No turn frees these segments from the skin. Raise `offset_root` of the guides' \
             Curve_Wind_Collision, which lifts roots out of creases.");
     STARTED_INSIDE = Metric::new("started_inside", Unit::None,
-        "Curves that would enter the skin and cross it at rest too, even with their roots lifted out of it: they are turned \
-         out of it as far as possible.");
+        "Curves that would enter the skin and, even with their roots lifted, also cross it at rest. They are turned out \
+         of it as far as possible.");
     UNGUIDED = Metric::new("unguided", Unit::None, "Curves without a guide, or with none within `radius`.")
         .warn_above(0.0, "These curves follow no guide: they only move with the skin, if one is wired. Raise `radius`, set it to 0 \
             to let every curve follow its nearest guides, or grow guides near them.");
     OFF_SKIN = Metric::new("guides_off_skin", Unit::None,
-        "Guides that do not move with the skin. The skin carries a root from one point to another. A guide counts if its root \
-         is off the second point by more than half the distance of the two, and by more than 0.01 of the guide's length.")
+        "Guides that do not move with the skin. A guide counts if its root misses the point to which the skin carries it \
+         by more than half the distance carried, and by more than 0.01 of the guide's length.")
         .warn_above(0.0, "`skin` moves and these guides do not, so the curves that follow them leave the skin. Put Curve_Attach, \
             with the same skins, after `rest_guides` and before the nodes that bend the guides.");
     FAR_ROOTS = Metric::new("far_roots", Unit::None,
@@ -82,8 +83,9 @@ metrics! { METRICS:
 pub(crate) static NODE: Node = Node::new(
     "Curve_Deform",
     2,
-    "Lets an existing groom follow guide curves, so that only a few hundred guides need to be simulated. Each curve turns \
-     as the guides nearest to its root have turned since rest, and keeps its own shape, length and attributes. On a skin, curves are kept out of it.",
+    "Lets an existing groom follow guide curves, so that only a few hundred guides need to be simulated. Each curve \
+     turns as the guides nearest to its root have turned since rest, and keeps its own shape, length and attributes. If \
+     `skin` is wired, curves are kept out of it.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)

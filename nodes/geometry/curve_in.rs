@@ -1,4 +1,4 @@
-//! Curve_In: curves from a file, or written into the graph.
+//! Curve_In: curves from a file, or from values given in the graph.
 
 use crate::shared::source::{self, Inline};
 use engine::files::File;
@@ -13,13 +13,13 @@ params! { PARAMS:
         "The number of the file to read, if `file` names a numbered sequence. Fractions are rounded down.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
-        "CVs written into the graph instead of a file, root to tip, one curve after the other.").unit(Unit::Metres);
+        "Positions of CVs given in the graph instead of a file, root to tip, one curve after the other.").unit(Unit::Metres);
     COUNTS: Param<Arc<Vec<i32>>> = Param::inline("counts",
         "Number of CVs of each curve in `points`. If empty, they all belong to one curve.");
     ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes",
-        "Attributes of CVs, written into the graph by name, one value per CV: `{\"mask\": [0, 0.5, 1]}`.");
+        "Attributes of CVs, given in the graph by name, one value per CV: `{\"mask\": [0, 0.5, 1]}`.");
     ELEMENT_ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("element_attributes",
-        "Attributes of curves, written into the graph by name, one value per curve: `{\"clump\": [7, 8]}`.");
+        "Attributes of curves, given in the graph by name, one value per curve: `{\"clump\": [7, 8]}`.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
         "Multiplies positions, velocities and widths. 0.01 converts a file in centimetres to metres.")
         .soft(0.001, 1000.0);
@@ -32,8 +32,8 @@ const CURVES: Output = Output::new("curves", &[Kind::Curves], "The curves.");
 pub(crate) static NODE: Node = Node::new(
     "Curve_In",
     2,
-    "Curves from a file, or written into the graph: fur, grass, fibres. Other geometry in the file is ignored; \
-     Mesh_In reads its polygons.",
+    "Reads curves from a file, or from values given in the graph: fur, grass, fibres. Other geometry in the file is \
+     ignored; Mesh_In reads its polygons.",
     Cook::Pure(cook),
 )
 .params(PARAMS)

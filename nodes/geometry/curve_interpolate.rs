@@ -36,7 +36,7 @@ params! { PARAMS:
     COUNT: Param<i64> = Param::int("guides", 3,
         "Number of nearest guides that a hair is blended from: 1 makes clumps around the guides, more make a smoother \
          coat.").within(1.0, MAX_GUIDES as f64).soft(1.0, 8.0);
-    CVS: Param<i64> = Param::int("cvs", 0, "Number of CVs of each hair. 0 takes the largest number that a guide has.")
+    CVS: Param<i64> = Param::int("cvs", 0, "Number of CVs of each hair. 0 uses the largest CV count of any guide.")
         .within(0.0, 10_000.0).soft(0.0, 32.0);
     SEED: Param<Seed> = Param::seed("Each seed gives other root positions.");
     MASK: Param<Name> = Param::text("mask", "",

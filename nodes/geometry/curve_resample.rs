@@ -15,8 +15,8 @@ params! { PARAMS:
     CVS: Param<i64> = Param::int("cvs", 5, "Number of CVs of each curve.")
         .within(2.0, MOST_CVS).soft(2.0, 32.0).when(|params| params.get(SPACING) == 0.0);
     SPACING: Param<f64> = Param::double("spacing", 0.0,
-        "Distance of CVs along a curve, instead of `cvs`: each curve gets the number of segments whose length is nearest to \
-         it, one at least. 0 takes `cvs`.")
+        "Distance of CVs along a curve, instead of `cvs`: each curve gets the number of segments, at least one, that \
+         brings their length closest to this. 0 uses `cvs`.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.1);
 }
 

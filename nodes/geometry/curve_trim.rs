@@ -19,8 +19,8 @@ params! { PARAMS:
         "Where curves begin, as a fraction of their length: at 0 at their roots. A mask is read at the root.")
         .within(0.0, 1.0);
     TO: Param<Maskable> = Param::maskable("to", 1.0,
-        "Where curves end, as a fraction of their length: at 1 at their tips. Keyed from 0 to 1 curves grow. A mask is read \
-         at the root, so that it cuts each curve to its own length.")
+        "Where curves end, as a fraction of their length: at 1 at their tips. Key it from 0 to 1 to make curves grow. A \
+         mask is read at the root, so that it cuts each curve to its own length.")
         .within(0.0, 1.0);
 }
 
@@ -28,7 +28,7 @@ const OUT: Output = Output::like("curves", &CURVES, "The trimmed curves.");
 
 metrics! { METRICS:
     TOTAL = Metric::new("cvs", Unit::None, "Number of CVs.");
-    NOTHING_LEFT = Metric::new("nothing_left", Unit::None, "Curves of which one CV is left.");
+    NOTHING_LEFT = Metric::new("nothing_left", Unit::None, "Curves cut away entirely; one CV of each is kept.");
     CROSSED = Metric::new("crossed", Unit::None, "Curves whose `from` is above their `to`, so that nothing is left of them.")
         .warn_above(0.0, "These curves are left with a single CV and are not drawn, because their `from` is above their `to`. Swap \
             the two numbers; if one of them is masked, check the values of its mask.");

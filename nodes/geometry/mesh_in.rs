@@ -1,4 +1,4 @@
-//! Mesh_In: a mesh from a file, or written into the graph.
+//! Mesh_In: a mesh from a file, or from values given in the graph.
 
 use crate::shared::source::{self, Inline};
 use engine::files::File;
@@ -13,15 +13,15 @@ params! { PARAMS:
         "The number of the file to read, if `file` names a numbered sequence. Fractions are rounded down.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
-        "Vertices written into the graph instead of a file.").unit(Unit::Metres);
+        "Positions of vertices given in the graph instead of a file.").unit(Unit::Metres);
     COUNTS: Param<Arc<Vec<i32>>> = Param::inline("counts", "Number of corners of each face. If empty, all faces are \
         triangles.");
     INDICES: Param<Arc<Vec<i32>>> = Param::inline("indices",
         "The vertex of each face corner, counted from 0, face after face, counter-clockwise as seen from outside.");
     ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes",
-        "Attributes of vertices, written into the graph by name, one value per vertex: `{\"mask\": [0, 0.5, 1]}`.");
+        "Attributes of vertices, given in the graph by name, one value per vertex: `{\"mask\": [0, 0.5, 1]}`.");
     ELEMENT_ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("element_attributes",
-        "Attributes of faces, written into the graph by name, one value per face: `{\"part\": [7, 8]}`.");
+        "Attributes of faces, given in the graph by name, one value per face: `{\"part\": [7, 8]}`.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
         "Multiplies positions, velocities and widths. 0.01 converts a file in centimetres to metres.")
         .soft(0.001, 1000.0);
@@ -32,7 +32,7 @@ const MESH: Output = Output::new("mesh", &[Kind::Mesh], "The mesh.");
 pub(crate) static NODE: Node = Node::new(
     "Mesh_In",
     2,
-    "A mesh from a file, or written into the graph: skins, colliders, bowls. Other geometry in the file is ignored.",
+    "A mesh from a file, or from values given in the graph: skins, colliders, bowls. Other geometry in the file is ignored.",
     Cook::Pure(cook),
 )
 .params(PARAMS)

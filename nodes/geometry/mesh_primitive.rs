@@ -14,10 +14,10 @@ choice! {
         Cylinder = "cylinder": "an upright cylinder with flat caps",
         Capsule = "capsule": "an upright cylinder with rounded caps; the length of its straight part is the height \
             minus the width",
-        Grid = "grid": "a flat open sheet in x and z, facing up; the height of `size` does not matter",
+        Grid = "grid": "a flat open sheet in x and z, facing up; the height in `size` is ignored",
         Torus = "torus": "a ring lying flat; its tube is round as long as the height is at most a third of the width",
         Bowl = "bowl": "the lower half of a hollow ellipsoid, open at the top",
-        Plate = "plate": "a box with height `thickness`; the height of `size` does not matter",
+        Plate = "plate": "a box with height `thickness`; the height in `size` is ignored",
     }
 }
 

@@ -1,4 +1,4 @@
-//! Point_In: loose points from a file, or written into the graph.
+//! Point_In: loose points from a file, or from values given in the graph.
 
 use crate::shared::source::{self, Inline};
 use engine::files::File;
@@ -13,9 +13,9 @@ params! { PARAMS:
         "The number of the file to read, if `file` names a numbered sequence. Fractions are rounded down.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
-        "Points written into the graph instead of a file.").unit(Unit::Metres);
+        "Positions of points given in the graph instead of a file.").unit(Unit::Metres);
     ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes", "Attributes of \
-        points, written into the graph by name, one value per point: `{\"mask\": [0, 0.5, 1]}`.");
+        points, given in the graph by name, one value per point: `{\"mask\": [0, 0.5, 1]}`.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
         "Multiplies positions, velocities and widths. 0.01 converts a file in centimetres to metres.")
         .soft(0.001, 1000.0);
@@ -26,7 +26,7 @@ const OUT: Output = Output::new("points", &[Kind::Points], "The points.");
 pub(crate) static NODE: Node = Node::new(
     "Point_In",
     2,
-    "Loose points from a file, or written into the graph: particles, pins. Other geometry in the file is ignored.",
+    "Loose points from a file, or from values given in the graph: particles, pins. Other geometry in the file is ignored.",
     Cook::Pure(cook),
 )
 .params(PARAMS)

@@ -1,4 +1,4 @@
-//! Tet_In: tets from a file, or written into the graph.
+//! Tet_In: tets from a file, or from values given in the graph.
 
 use crate::shared::source::{self, Inline};
 use engine::files::File;
@@ -12,14 +12,14 @@ params! { PARAMS:
         "The number of the file to read, if `file` names a numbered sequence. Fractions are rounded down.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
-        "Points written into the graph instead of a file.").unit(Unit::Metres);
+        "Positions of points given in the graph instead of a file.").unit(Unit::Metres);
     TETS: Param<Arc<Vec<[u32; 4]>>> = Param::inline("tets",
         "Four point indices per tet, counted from 0. Seen from the fourth point, the first three run \
          counter-clockwise.");
     ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes", "Attributes of \
-        points, written into the graph by name, one value per point: `{\"mask\": [0, 0.5, 1]}`.");
+        points, given in the graph by name, one value per point: `{\"mask\": [0, 0.5, 1]}`.");
     ELEMENT_ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("element_attributes",
-        "Attributes of tets, written into the graph by name, one value per tet: `{\"part\": [7, 8]}`.");
+        "Attributes of tets, given in the graph by name, one value per tet: `{\"part\": [7, 8]}`.");
     SCALE: Param<f64> = Param::double("scale", 1.0,
         "Multiplies positions, velocities and widths. 0.01 converts a file in centimetres to metres.")
         .soft(0.001, 1000.0);
@@ -30,7 +30,7 @@ const OUT: Output = Output::new("tets", &[Kind::Tets], "The tets.");
 pub(crate) static NODE: Node = Node::new(
     "Tet_In",
     2,
-    "Tets from a file, or written into the graph: soft bodies made in other programs. Other geometry in the file is \
+    "Tets from a file, or from values given in the graph: soft bodies made in other programs. Other geometry in the file is \
      ignored.",
     Cook::Pure(cook),
 )

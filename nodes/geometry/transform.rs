@@ -22,7 +22,7 @@ inputs! { INPUTS:
 params! { PARAMS:
     TRANSLATE: Param<[f64; 3]> = Param::dvec3("translate", [0.0; 3], "Translation, applied last.").unit(Unit::Metres);
     ROTATE: Param<Turn> = Param::rotation("rotate",
-        "Rotation about the pivot: about x, then y, then z. Between keys it rotates about a single axis.");
+        "Rotation about the pivot: about x, then y, then z. Between two keys it is interpolated about one common axis.");
     SCALE: Param<[f64; 3]> = Param::dvec3("scale", [1.0; 3],
         "Scale along x, y and z about the pivot, applied first. Negative values mirror, 0 flattens.").soft(0.01, 100.0);
     PIVOT: Param<[f64; 3]> = Param::dvec3("pivot", [0.0; 3],

@@ -14,13 +14,13 @@ params! { PARAMS:
          `fur.####.usdc`. Files that it references, and value clips, are read too.")
         .read_with(companions);
     PRIM: Param<Name> = Param::text("prim", "",
-        "Path of the prim that is read, with all under it: `/set/fur`. If empty, all prims are read.").fixed();
+        "Path of the prim to read, with all its descendants, such as `/set/fur`. If empty, all prims are read.").fixed();
     FRAME: Param<f64> = Param::double("frame", 0.0,
         "The time code to read. Between two samples of the file values are interpolated.")
         .unit(Unit::Frame).default_current_time().of_timed_file(moves);
     SCALE: Param<f64> = Param::double("scale", 1.0,
-        "Multiplies positions, velocities and widths, after the file's own unit is converted to metres. USD counts in \
-         centimetres where a file does not say: 100 undoes that.")
+        "Multiplies positions, velocities and widths, after the file's own unit is converted to metres. USD assumes \
+         centimetres where a file gives no unit: a `scale` of 100 undoes that.")
         .soft(0.001, 1000.0);
 }
 
@@ -45,10 +45,11 @@ const HELD: Metric = Metric::new(
 pub(crate) static NODE: Node = Node::new(
     "Usd_In",
     2,
-    "Curves, meshes, points and tets from a USD file: grooms, animation, what convect wrote. Transforms are applied, also \
-     moving ones, and unit and axes are converted to metres and Y up. Primvars become attributes: `displayColor` is `Cd`, \
-     `st` is `uvw`, `widths` is `width`, `velocities` is `v`. Cubic curves enter by their control points, subdivision \
-     surfaces by their control mesh. Invisible prims, proxies and guides are not read.",
+    "Curves, meshes, points and tets from a USD file: grooms, animation, files written by convect. Transforms are \
+     applied, animated ones too, and the file's unit and up axis are converted to metres and Y up. Primvars become \
+     attributes: `displayColor` is `Cd`, `st` is `uvw`, `widths` is `width`, `velocities` is `v`. Cubic curves are read \
+     as their control points, subdivision surfaces as their control mesh. Invisible prims, proxies and guides are not \
+     read.",
     Cook::Pure(cook),
 )
 .params(PARAMS)

@@ -55,7 +55,7 @@ const SEPARATION_FRAMES: u32 = 12;
 inputs! { INPUTS:
     BODIES: Input<Many> = Input::many("bodies", Kind::Tets,
         "Bodies from Tetrahedralize, in their initial positions. A surface mesh that comes with the tets is carried \
-         along by them and is what touches other things; without one, the boundary of the tets is the surface.").read_at(|_| Times::START);
+         along by them and makes the contacts; without one, the boundary of the tets is the surface.").read_at(|_| Times::START);
     COLLIDERS: Input<Many> = Input::many("colliders", Kind::Mesh,
         "Meshes that bodies collide with: hands, rolling pins, bowls. They may move, rotate and deform.")
         .read_at(|_| Times::within_step(COLLIDER_SAMPLES));
@@ -77,9 +77,9 @@ params! { PARAMS:
         .unit(Unit::KilogramsPerCubicMetre).above(0.0).soft(100.0, 3000.0);
     STIFFNESS: Param<Maskable> = Param::maskable("stiffness", 5e3,
         "Resistance to stretching (Young's modulus): dough 1e3 to 1e4, gelatine 1e4, rubber 1e6. To carry its weight a \
-         body needs about `density` × gravity × its height: with that much it sags by a sixth, with a quarter of it to \
-         half its height, with a twentieth tets turn inside out, and with less than a thousandth it is a flat heap that \
-         loses its volume.")
+         body needs about `density` × gravity × its height: at that stiffness it sags by a sixth, at a quarter of it to \
+         half its height; at a twentieth tets turn inside out, and below a thousandth it collapses into a flat heap and \
+         loses volume.")
         .unit(Unit::Pascal).at_least(0.0).soft(0.0, 1e6);
     DAMPING: Param<Maskable> = Param::maskable("damping", 0.01,
         "How quickly wobbling fades: the ratio of the springs' damping to their stiffness. With 0 bodies keep \
@@ -100,7 +100,7 @@ params! { PARAMS:
         "Rate at which strain beyond `plastic_yield` becomes permanent: at 10 within a few frames, at 0 never.")
         .unit(Unit::PerSecond).at_least(0.0).soft(0.0, 50.0);
     RESET_TO_GOALS: Param<f32> = Param::float("reset_to_goals", 1.0,
-        "How far the body's rest shape changes to that of a goal once the goal's frame is passed: at 1 the body keeps \
+        "How much of a goal's shape becomes the body's rest shape once the goal's frame is passed: at 1 the body keeps \
          the goal's shape after it is released, at 0 it springs back.").within(0.0, 1.0);
     RESET_FRAMES: Param<i64> = Param::int("reset_frames", 4, "Number of frames over which the rest shape changes to \
         that of a goal. A sudden change jolts the body.")
@@ -128,10 +128,10 @@ params! { PARAMS:
         "Coefficient of friction: at 0 bodies slide freely, at 1 they stick to a slope of 45 degrees.")
         .at_least(0.0).soft(0.0, 1.0);
     BOUNCE: Param<f32> = Param::float("bounce", -1.0,
-        "The largest speed at which a body leaves what it hits, relative to the speed at which it approached: at 0 it does \
-         not bounce, at 0.5 it comes back to a quarter of the height at most. Below 0 it bounces as its stiffness and \
-         damping let it. Except at 0, impacts take more time steps; slower ones than three frames of gravity (1.2 m/s) do \
-         not, so they lose more speed.")
+        "The largest speed at which a body leaves what it hits, relative to its speed of approach: at 0 it does not \
+         bounce, at 0.5 it rises at most to a quarter of the height it fell from. Below 0 the bounce is not limited: \
+         only stiffness and damping determine it. Except at 0, impacts take more time steps. Those slower than three \
+         frames of free fall (1.2 m/s at 24 fps) do not, so they lose more speed.")
         .within(-1.0, 1.0);
     SELF_COLLISION: Param<bool> = Param::bool("self_collision", true, "Whether bodies collide with themselves.");
     BODY_COLLISION: Param<bool> = Param::bool("body_collision", true, "Whether bodies collide with each other.");
@@ -145,7 +145,7 @@ params! { PARAMS:
         .above(0.0).soft(1e-6, 1e-2)
         .when(|params| params.get(INTEGRATOR) == Stepping::Accurate);
     SUBSTEPS: Param<i64> = Param::int("substeps", 0,
-        "Number of time steps per frame. 0 takes as many as needed, usually one.")
+        "Number of time steps per frame. 0 uses as many as needed, usually one.")
         .within(0.0, 256.0)
         .soft(0.0, 16.0);
     INITIAL_VELOCITY: Param<[f32; 3]> = Param::vec3("initial_velocity", [0.0; 3],
@@ -192,14 +192,14 @@ metrics! { METRICS:
         "Energy that the frame lost in other ways than by `damping`, `drag` and `friction`: by time stepping, by contacts \
          and by `bounce`. More `substeps` lose less.");
     LOST_SHARE = Metric::new("lost_share", Unit::None,
-        "`energy_lost` relative to the energy that there was, kinetic and stored. 0 for slow bodies; missing where `bounce` \
+        "`energy_lost` relative to the kinetic and stored energy at the start of the frame, or at its end plus what was lost if that is more. 0 for slow bodies; missing where `bounce` \
          is 0.")
         .warn_above(0.9, "Bodies stop dead at these frames where they would bounce: time steps are too long for what they \
             hit. Set more `substeps`, or leave that to the solver (`substeps` 0, `integrator` `default`); with `bounce` 0 they \
             are meant to.");
     UNCUT_IMPACTS = Metric::new("uncut_impacts", Unit::None,
-        "Time steps in which a body hits something that should have been cut shorter for its bounce, but were not because \
-         the frame took 350 Newton iterations or more.")
+        "Time steps with an impact that should have been shortened for the bounce, but were not because the frame took \
+         350 Newton iterations or more.")
         .warn_above(0.0, "So much is in contact that there is no time for bounces at these frames: bodies lose more speed \
             than their material would. Set `substeps` to pay for them, or `bounce` to 0 if they need not bounce.");
     VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume relative to the rest volume.")
@@ -211,23 +211,23 @@ metrics! { METRICS:
         .warn_above(0.0, "Parts of a body are turned inside out: something squeezes it harder than it can resist. \
             Raise `volume` or `stiffness`, slow the colliders, or leave more room between them.");
     STIFFNESS_TO_WEIGHT = Metric::new("stiffness_to_weight", Unit::None,
-        "How well the softest body carries its own weight: `stiffness` ÷ (density × gravity × height). Missing without \
-         weight, or without colliders and ground to lie on.")
+        "How well the softest body carries its own weight: `stiffness` ÷ (density × gravity × height). Not reported if \
+         bodies have no weight, or neither collider nor ground to lie on.")
         .warn_outside(0.25, f64::INFINITY, "A body is too soft to carry its weight: it flattens where it lies. Raise \
             `stiffness`, or lower `density` or `gravity`.");
     CONTACTS = Metric::new("contacts", Unit::None, "Contacts in which surfaces press on each other.");
     DEEPEST_OVERLAP = Metric::new("deepest_overlap", Unit::Metres,
-        "`thickness` minus the smallest distance between surfaces, as returned, negative inside: by how much surfaces are \
-         closer than `thickness` at the worst place. More than `thickness` means that something is inside.");
+        "`thickness` minus the smallest distance between surfaces in the output (negative where one is inside another): \
+         by how much they are closer than `thickness`, at worst. More than `thickness` means that something is inside.");
     POINTS_INSIDE = Metric::new("points_inside", Unit::None,
-        "Particles and points of the surface that are returned inside a closed collider or another body.");
+        "Particles and surface points of the output that lie inside a closed collider or another body.");
     DEEPEST_PENETRATION = Metric::new("deepest_penetration", Unit::Metres,
-        "By how much `deepest_overlap` exceeds `thickness`: how far surfaces went through each other. 0 while what \
-         started inside is not out yet.")
+        "By how much `deepest_overlap` exceeds `thickness`: how far surfaces went through each other. 0 until all that \
+         started inside has been pushed out.")
         .warn_above(0.0, "Surfaces went through each other. Set more `substeps`, slow the colliders, leave more room \
             between them, or raise `thickness`.");
     JAMMED = Metric::new("jammed", Unit::None,
-        "Contacts with colliders that leave no room above the ground: less than twice `thickness`.")
+        "Contacts with colliders less than twice `thickness` above the ground, which leave a body no room.")
         .warn_above(0.0, "A collider closes on the ground with a body between, where there is no room for it. It counts \
             as stopped above the ground there, and passes through the body. Keep it higher by 2 `thickness` or more.");
     STARTED_INSIDE = Metric::new("started_inside", Unit::None,
@@ -239,7 +239,7 @@ metrics! { METRICS:
             {bodies:started_in_bodies_other}, for one. They are pushed apart the shortest way over 12 frames. Move them \
             apart at `start_frame`.");
     STARTED_IN_BODIES_WIRE = Metric::new("started_in_bodies_wire", Unit::None,
-        "The wire of one of the first two of these bodies, from 0; −1 if there are none.");
+        "The wire of one body of the first such pair, counted from 0; −1 if there is none.");
     STARTED_IN_BODIES_OTHER = Metric::new("started_in_bodies_other", Unit::None,
         "The wire of the other; −1 if there are none.");
     STARTED_IN_COLLIDERS = Metric::new("started_in_colliders", Unit::None,
@@ -247,8 +247,8 @@ metrics! { METRICS:
         .warn_above(0.0, "Bodies start inside a collider or below the ground, and are pushed out the shortest way over 12 \
             frames, which may be the wrong one. Move them apart at `start_frame`.");
     NOT_PUSHED_OUT = Metric::new("not_pushed_out", Unit::None,
-        "Points that are still inside something after 12 frames, as they have been since the start; missing before, and \
-         without any at the start.")
+        "Points that have been inside something since the start and still are after 12 frames. Not reported before that, \
+         or if none started inside.")
         .warn_above(0.0, "What started inside something could not be pushed out in 12 frames, and stays inside by \
             `deepest_overlap`: pins or colliders leave it no room. Move bodies apart at `start_frame`.");
     LET_GO = Metric::new("let_go", Unit::None,
@@ -259,8 +259,8 @@ metrics! { METRICS:
     GOAL_DISTANCE = Metric::new("goal_distance", Unit::Metres,
         "Mean distance of the particles pulled by goals from their targets.");
     GOAL_MISS = Metric::new("goal_miss", Unit::None,
-        "How near a body came to a goal while it should have had its shape: mean distance relative to the size of the \
-         body. The largest of all goals so far; missing before the first.")
+        "How far a body was from a goal's shape when it should have had it: mean distance relative to the body's size. \
+         The largest over all goals so far; not reported before the first.")
         .warn_last_above(0.25, "{bodies:goal_miss_body} never comes near {goals:goal_miss_goal}: something is in the way, or the goal is too weak. Raise `strength` of Softbody_Goal, give the body more \
             frames to get there, or lower `stiffness`; see whether colliders, pins or the ground hold it back.");
     GOAL_MISS_BODY = Metric::new("goal_miss_body", Unit::None, "The wire of that body, from 0.");
@@ -274,7 +274,8 @@ metrics! { METRICS:
         .warn_above(0.0, "{goals:early_goals_wire} is over when the simulation starts, so it does not \
             pull. Give it a `frame` after the simulation's `start_frame`.");
     EARLY_GOALS_WIRE = Metric::new("early_goals_wire", Unit::None, "The first of these goals, from 0; −1 if there is none.");
-    DOUBLED_GOALS = Metric::new("doubled_goals", Unit::None, "Goals at whose frame their body is still held by another goal.")
+    DOUBLED_GOALS = Metric::new("doubled_goals", Unit::None, "Goals whose body is still held by another goal at their \
+        frame.")
         .warn_above(0.0, "At the `frame` of {goals:doubled_goals_wire} its body is still held by another \
             goal, so it jumps from one to the other. Give each goal a `frame` after the `frame` and `hold` of the one \
             before it.");
@@ -285,7 +286,7 @@ metrics! { METRICS:
     IDLE_PINS_WIRE = Metric::new("idle_pins_wire", Unit::None, "The wire of the first of these pins, from 0; −1 if there is none.");
     IDLE_PINS_POINT = Metric::new("idle_pins_point", Unit::None, "The point of the first of these pins, from 0; −1 if there is none.");
     CARRIED_OUTSIDE = Metric::new("carried_outside", Unit::None,
-        "Points of the mesh that rides along which are farther outside the tets than a tet is large.")
+        "Points of the mesh that rides along that are outside the tets by more than the size of a tet.")
         .warn_above(0.0, "The mesh that rides along reaches far out of the tets, which stretch it there beyond what the body \
             does. Give `carry` of Tetrahedralize a mesh that lies within its surface, or the surface the shape of that mesh.");
     PINNED = Metric::new("pinned", Unit::None,

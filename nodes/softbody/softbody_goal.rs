@@ -38,9 +38,9 @@ params! { PARAMS:
         .unit(Unit::Frame).fixed();
     STRENGTH: Param<Maskable> = Param::maskable("strength", 100.0,
         "How strongly the body is pulled towards the shape: acceleration per distance. 0 does not pull. About 200 · \
-         stiffness ÷ (density · size²) brings the body to within 1 % of its size: 4e4 for dough of 5e3 Pa that is 0.16 \
-         m across, 1e3 if it is 1 m across. A mask on the points of `body` directs a part of it: where it is 0, \
-         particles are free.")
+         stiffness ÷ (density · size²) brings the body within 1 % of its size from the shape: 4e4 for dough of 5e3 Pa \
+         that is 0.16 m across, 1e3 if it is 1 m across. A mask on the points of `body` directs a part of it: where it \
+         is 0, particles are free.")
         .unit(Unit::PerSecondSquared).at_least(0.0).soft(0.0, 1e5);
     HOLD: Param<f32> = Param::float("hold", 0.0,
         "How long the body is held in the shape before it moves on to the next goal or is released.")
@@ -82,8 +82,9 @@ pub(crate) static NODE: Node = Node::new(
     3,
     "Turns a target shape of a body's surface into a goal for the whole body: the interior follows as if it were \
      elastic. Wire it into `goals` of Softbody, and the body reaches the shape at the frame set here. The shape must \
-     have the points and faces of the mesh that comes with the body: its surface, or a mesh that rides along in the tets, \
-     as in a cage. The tets bring a mesh that rides along as near to the shape as they can; `shape_error` says how near.",
+     have the points and faces of the mesh that comes with the body: its surface, or a mesh that rides along in the \
+     tets, as in a cage. The tets bring a mesh that rides along as close to the shape as they can; `shape_error` gives \
+     the distance that remains.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)

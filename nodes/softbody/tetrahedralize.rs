@@ -49,10 +49,10 @@ choice! {
 
 inputs! { INPUTS:
     SURFACE: Input = Input::one("surface", Kind::Mesh,
-        "Closed surfaces, one per body. A surface within another one is the wall of a cavity, and one within a cavity \
-         is a body again. Coarse faces make a coarse body. With `method` `cage` any mesh: what its faces run around \
-         once or more is inside (a wall of a cavity has to face into it), holes count as closed, and sheets are as thick \
-         as a tet.");
+        "Closed surfaces, one per body. A surface within another one is the wall of a cavity, and one within a cavity is \
+         a body again. Coarse faces make a coarse body. With `method` `cage`, any mesh: regions with a winding \
+         number of a half or more, or −½ or less, are inside (the wall of a cavity must face into the cavity), holes count as closed, and sheets become \
+         one tet thick.");
     CARRY: Input<Opt> = Input::optional("carry", Kind::Mesh,
         "A mesh that rides along in the tets instead of `surface`, such as a finer version of it.");
 }
@@ -60,7 +60,7 @@ inputs! { INPUTS:
 params! { PARAMS:
     METHOD: Param<Method> = Param::choice("method", Method::Delaunay, "How the tets are made.");
     SPACING: Param<f64> = Param::double("spacing", 0.0,
-        "Approximate distance between inner points, and the size of a cage's tets. 0 takes the mean edge length of the \
+        "Approximate distance between inner points, and the size of a cage's tets. 0 uses the mean edge length of the \
          surface. Half the distance makes eight times as many points.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 1.0)
         .when(|params| params.get(INTERIOR) || params.get(METHOD) == Method::Cage);
@@ -101,7 +101,7 @@ metrics! { METRICS:
         "These points of the surface belong to no tet, so they are connected only by springs along the surface. Look \
          for thin spikes and doubled walls, and thicken or remove them.");
     SLIVERS = Metric::new("slivers", Unit::None,
-        "Tets too flat to have a meaningful volume, which only hold springs.");
+        "Tets too flat to have a meaningful volume; only their springs act.");
     SLIVER_SHARE = Metric::new("sliver_share", Unit::None, "`slivers` relative to `tets`.")
         .warn_above(0.02, "Many tets are too flat to preserve their volume: where they lie, the body is held by springs \
             alone. Set `interior`, or give the surface smaller and more even faces where it is thin.");
@@ -116,14 +116,14 @@ metrics! { METRICS:
 pub(crate) static NODE: Node = Node::new(
     "Tetrahedralize",
     2,
-    "Fills closed surfaces with tets, or any surface with a cage of them, so that they can be simulated as soft bodies. By \
-     default inner points are about as far apart as those of the surface. Points get the attributes `surface_point`, the \
-     index of the corresponding point of the surface (−1 inside, in a cage, and with `carry`), and `side`: 1 on the \
+    "Fills closed surfaces with tets, or any surface with a cage of them, so that they can be simulated as soft bodies. \
+     By default inner points are about as far apart as those of the surface. Points get the attributes `surface_point`, \
+     the index of the corresponding point of the surface (−1 inside, in a cage, and with `carry`), and `side`: 1 on the \
      outside of a body, 2 on the wall of a cavity, 0 inside. Tets get `body`, the number of their body from 0, and \
      `sliver`, 1 if the tet is too flat to have a meaningful volume; in a cage also `fill`, the share of the tet inside \
      the surface, by which Softbody scales mass and stiffness. Point attributes of the surface are carried to the points \
-     of the tets, inside from the nearest point of the surface, so that they can mask params of Softbody. The output \
-     includes the mesh that rides along.",
+     of the tets (inner points take those of the nearest surface point), so that they can mask params of Softbody. The \
+     output includes the mesh that rides along.",
     Cook::Pure(cook),
 )
 .inputs(INPUTS)

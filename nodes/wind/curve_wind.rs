@@ -38,8 +38,8 @@ choice! {
 choice! {
     /// Where noise is sampled.
     enum Space {
-        World = "world": "at the root's current position, so a moving animal passes through the pattern",
-        Rest = "rest": "at the root's rest position, so the pattern sticks to a moving animal: `Pref` of the root if \
+        World = "world": "sampled at the root's current position, so a moving animal passes through the pattern",
+        Rest = "rest": "sampled at the root's rest position, so the pattern sticks to a moving animal: `Pref` of the root if \
                 the curves have it, otherwise its position at the scene's first frame",
     }
 }
@@ -65,7 +65,7 @@ inputs! { INPUTS:
 
 params! { PARAMS:
     WIND_DIR: Param<[f64; 3]> = Param::direction("wind_dir", [1.0, 0.0, 0.0],
-        "The direction that the wind blows towards. Its length does not matter.").history();
+        "The direction that the wind blows towards. Its length is ignored.").history();
     NOISE: Param<NoiseChoice> = Param::choice("noise", Some(NoiseKind::Perlin),
         "The noise that varies the wind's direction from place to place.");
     AMPLITUDE: Param<Maskable> = Param::maskable("amplitude", 0.5,
@@ -86,8 +86,9 @@ params! { PARAMS:
         "How fast the noise pattern moves downwind. 0 holds it still.")
         .unit(Unit::MetresPerSecond).soft(-10.0, 10.0).history().when(has_noise);
     LOOP: Param<f64> = Param::double("loop", 0.0,
-        "Number of frames after which the noise comes again, for a cycle that can be repeated; keyed params must repeat \
-         too. The pattern fades over into itself, so it should move by a feature or more in this time. 0 does not loop.")
+        "Number of frames after which the noise repeats, for a cycle that can be looped; keyed params must repeat too. \
+         The pattern cross-fades into itself, so it should move by the size of a feature or more in this time. 0 does \
+         not loop.")
         .unit(Unit::Frames).within(0.0, 1e9).soft(0.0, 240.0).when(|params| has_noise(params) && params.get(SCROLL) != 0.0);
     NOISE_SPACE: Param<Space> = Param::choice("noise_space", Space::World,
         "Whether the noise pattern stays in the world or sticks to the animal.").when(has_noise);
@@ -125,8 +126,9 @@ pub(crate) static NODE: Node = Node::new(
     "Curve_Wind",
     2,
     "Bends curves in the wind, root to tip, without stretching them. Each CV turns the rest of its curve towards the \
-     wind. Noise, which moves downwind, varies the wind's direction from place to place. An `envelope` on the CVs (1 \
-     if missing) scales the wind; gusts and shielding write it. `gust_dir`, which gusts write, is added to its direction.",
+     wind. Noise, which moves downwind, varies the wind's direction from place to place. An `envelope` on the CVs (1 if \
+     missing) scales the wind, and `gust_dir` is added to its direction. Curve_Wind_Gusts writes both, \
+     Curve_Wind_Shielding `envelope`.",
     Cook::Frame { cook, reads_clock: |params| has_noise(params) && params.get(SCROLL) != 0.0 },
 )
 .inputs(INPUTS)

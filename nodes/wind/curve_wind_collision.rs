@@ -54,18 +54,18 @@ params! { PARAMS:
         segments stop closer to the contact, at proportionally higher cost.")
         .within(1.0, 1e6).soft(2.0, 64.0).when(|params| params.get(METHOD) == Method::Steps);
     OFFSET_ROOT: Param<Maskable> = Param::maskable("offset_root", 1e-4,
-        "How far outside the skin each root is moved, together with its curve: in a crease this far from all its faces, if \
-         a move of 4 times this distance reaches that. If this is less than `gap`, the \
-         beginning of a curve is not tested, because it touches the skin.")
+        "How far outside the skin each root is moved, together with its curve: in a crease, until it is this far from \
+         all faces, if a move of at most 4 times this distance achieves that. If this is less than `gap`, the beginning \
+         of a curve is not tested, because it touches the skin.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.1);
     OFFSET_SCALE: Param<Maskable> = Param::maskable("offset_scale", -1.0,
         "Minimum height above the skin, relative to the height at rest: 1 keeps the volume of the coat, smaller values \
          let the wind press it down. Negative values turn this off.")
         .soft(-1.0, 1.0);
     LOFT: Param<Maskable> = Param::maskable("loft", 0.0,
-        "Share of its height at rest, above the skin as it curves away from the root, that a CV keeps which the wind blows \
-         below it: a little keeps a coat from lying on the skin, so that far fewer curves touch it. On most bodies fewer \
-         jump as the wind turns. `coherence` scales it by 1 − its own value. 0 is the paper's.")
+        "Share of its rest height that a CV keeps, at least, where the wind presses it down; heights are measured above \
+         the curved skin. A little keeps a coat from lying on the skin, so that far fewer curves touch it. On most \
+         bodies fewer curves jump as the wind turns. It is multiplied by 1 − `coherence`. 0 is as in the paper.")
         .within(0.0, 1.0).when(|params| {
             let coherence = params.get(COHERENCE);
             params.get(OFFSET_SCALE).value < 0.0 && (coherence.value < 1.0 || coherence.attribute.is_some())
@@ -78,12 +78,12 @@ params! { PARAMS:
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     COHERENCE: Param<Maskable> = Param::maskable("coherence", 0.0,
         "How strongly curves blown into the skin are redirected outward, so that they do not flip from one side to the \
-         other as wind and skin move. At 0 each segment stops at its first contact, which depends on all of its way: a \
+         other as wind and skin move. At 0 each segment stops at its first contact, which depends on its whole path: a \
          few curves in a thousand jump in each frame. At 1 there are hardly more jumps than in the wind itself (see the \
-         metric `jumps`), few curves touch the skin, and tips move 1 to 3 % less; collision takes 1.7 times as long. The more \
-         directly the wind blows into the skin, the more upright curves stay that would otherwise lie flat. Above 0 a \
-         curve may end on the other side of a fold of the skin, but of no other collider; values between 0 and 1 leave \
-         part of the redirection, and of the jumps.")
+         metric `jumps`), few curves touch the skin, and tips move 1 to 3 % less; collision takes 1.7 times as long. The \
+         more directly the wind blows into the skin, the more upright curves stay that would otherwise lie flat. Above 0 \
+         a curve may end on the other side of a fold of the skin, but of no other collider; values between 0 and 1 \
+         redirect only partly, and leave some of the jumps.")
         .within(0.0, 1.0);
     BLEND: Param<Maskable> = Param::maskable("blend", 1.0,
         "How much of each segment's collision response is applied: 0 leaves the curves as the wind bends them, 1 keeps \
@@ -110,9 +110,10 @@ metrics! { METRICS:
          seen and hidden. Either their curves cross a collider at rest and no turn frees them (`unfreed_segments`); or \
          `blend` is below 1. Raise `offset_root`, or start from curves that are clear of the colliders.");
     UNFREED = Metric::new("unfreed_segments", Unit::None,
-        "Segments that cross a collider and that no turn can free, of curves that cross one at rest too.");
+        "Segments that cross a collider and that no turn can free, in curves that also cross one at rest.");
     BLENDED = Metric::new("blended_to_rest", Unit::None,
-        "Curves that turns alone did not free: they are blended towards rest up to their first pose without a crossing.")
+        "Curves that could not be freed by turning segments alone: they are blended towards rest until they cross \
+            nothing.")
         .warn_above(MANY, "So many curves are held back near their rest shape, because one of their segments would cross a \
             collider however it turned; they may jump where that begins and ends. `blended` of the output says which. \
             Raise `coherence`, or resample the curves to shorter segments where the skin has folds.");
@@ -121,8 +122,8 @@ metrics! { METRICS:
             from: they are turned outwards as far as possible. Clear them of the collider in their rest shape, raise \
             `offset_root`, or leave out that collider.");
     LOW_ROOTS = Metric::new("low_roots", Unit::None,
-        "Roots in creases so narrow that a move of 4 times `offset_root` does not bring them that far from all faces. \
-         They are as far from them as such a move brings them.")
+        "Roots in creases so narrow that a move of 4 times `offset_root` does not bring them `offset_root` away from all \
+         faces. They are moved as far away as that allows.")
         .warn_above(MANY, "So many roots lie in creases too narrow for `offset_root`: their curves begin nearer to the skin \
             than that, and may touch it. `low_root` of the output says which. Lower `offset_root` (down to `gap`) until \
             they fit, or move these curves out of the creases.");
@@ -141,9 +142,9 @@ pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Collision",
     8,
     "Keeps curves that are bent by wind out of colliders. Each segment, root to tip, turns from its rest direction \
-     towards the direction that the wind gave it, until it touches a collider. Place this node after the wind, and \
-     wire the curves from before the wind into `rest`. Of each curve, `unfreed` is the number of segments that still \
-     cross a collider, `blended` is 1 if it is held back near its rest shape, and `low_root` if its root is nearer to the \
+     towards the direction that the wind gave it, until it touches a collider. Place this node after the wind, and wire \
+     the curves from before the wind into `rest`. Attributes of each curve: `unfreed`, the number of segments that still \
+     cross a collider; `blended`, 1 if it is held back near its rest shape; `low_root`, 1 if its root is nearer to the \
      skin than `offset_root`.",
     Cook::Pure(cook),
 )

@@ -42,7 +42,7 @@ inputs! { INPUTS:
 
 params! { PARAMS:
     WIND_DIR: Param<[f64; 3]> = Param::direction("wind_dir", [1.0, 0.0, 0.0],
-        "The direction that the wind blows towards and gusts travel in. Its length does not matter.")
+        "The direction that the wind blows towards and gusts travel in. Its length is ignored.")
         .history().when(is_asked);
     NUM_GUSTS: Param<i64> = Param::int("num_gusts", 8, "Number of gusts. With 0 there are only those placed by hand.")
         .within(0.0, 1e6).soft(0.0, 100.0);
@@ -54,7 +54,8 @@ params! { PARAMS:
          Noise never enlarges a gust. Each gust's value is drawn at random from this range.")
         .within(0.0, 1.0).when(is_asked);
     SPEED_RANGE: Param<Span> = Param::span("speed_range", [1.0, 3.0],
-        "Range of the speeds at which gusts travel. Keys also change the speed of gusts that are already travelling.")
+        "Range of the speeds at which gusts travel. Animating this also changes the speed of gusts that are already \
+            travelling.")
         .unit(Unit::MetresPerSecond).at_least(0.0).soft(0.0, 20.0).history().when(is_asked);
     START_FRAME_RANGE: Param<Span> = Param::span("start_frame_range", [1.0, 48.0],
         "Range of frames at which gusts start. Each gust's is drawn at random from it.")
@@ -66,18 +67,18 @@ params! { PARAMS:
         "Range of durations over which gusts fade after their life, while they still travel. 0 ends them at once.")
         .unit(Unit::Frames).within(0.0, 1e9).soft(0.0, 240.0).when(is_asked);
     DISTANCE: Param<f64> = Param::double("distance", 0.0,
-        "How far upwind of the curves gusts start. 0 takes the largest radius, so that gusts start just outside the \
+        "How far upwind of the curves gusts start. 0 uses the largest radius, so that gusts start just outside the \
          curves.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 10.0).when(is_asked);
     AREA: Param<[f32; 2]> = Param::vec2("area", [0.0; 2],
-        "Width and height of the rectangle, across the wind, in which gusts start. 0 takes the width or the height of \
+        "Width and height of the rectangle, across the wind, in which gusts start. 0 uses the width or the height of \
          the curves as seen along the wind.").unit(Unit::Metres).at_least(0.0).soft(0.0, 10.0).when(is_asked);
     REPEAT_EVERY: Param<f64> = Param::double("repeat_every", 0.0,
         "Number of frames after which each gust is sent again, with new random values. With 0 it is sent once.")
         .unit(Unit::Frames).at_least(0.0).soft(0.0, 240.0).when(is_asked);
     LOOP: Param<f64> = Param::double("loop", 0.0,
-        "Number of frames after which the same gusts come again, for a cycle that can be repeated; keyed params must \
-         repeat too. `repeat_every` is then adjusted so that it divides the loop. 0 does not loop.")
+        "Number of frames after which the same gusts repeat, for a cycle that can be looped; keyed params must repeat \
+         too. `repeat_every` is then adjusted so that it divides the loop. 0 does not loop.")
         .unit(Unit::Frames).within(0.0, 1e9).soft(0.0, 240.0).when(is_asked);
     FALLOFF: Param<Arc<Ramp>> = Param::smooth_ramp("falloff", &[[0.0, 1.0], [1.0, 0.0]],
         "Strength of the wind within a gust, from its centre (0) to its boundary (1): 1 is the full wind.")
@@ -91,8 +92,9 @@ params! { PARAMS:
          reaches farther towards their boundaries. The wind never exceeds its full strength.")
         .at_least(0.0).soft(0.0, 4.0);
     SHEAR: Param<Maskable> = Param::maskable("shear", 0.0,
-        "How strongly each gust also blows to a side of its own, relative to the wind: curves do not only bend more where \
-         a gust passes, but in another direction. Gusts placed by hand blow with the wind. 0 turns it off.")
+        "How strongly each gust also blows sideways, in a direction of its own, relative to the wind: where a gust \
+         passes, curves bend not only more but also in another direction. Gusts placed by hand blow with the wind. 0 \
+         turns it off.")
         .soft(0.0, 1.0).when(is_asked);
     SEED: Param<Seed> = Param::seed("Each seed gives other gusts.").when(is_asked);
     GROUP: Param<Name> = group::param();

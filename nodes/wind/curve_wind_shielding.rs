@@ -34,7 +34,7 @@ inputs! { INPUTS:
 
 params! { PARAMS:
     WIND_DIR: Param<[f64; 3]> = Param::direction("wind_dir", [1.0, 0.0, 0.0],
-        "The direction that the wind blows towards. Its length does not matter.");
+        "The direction that the wind blows towards. Its length is ignored.");
     OFFSET: Param<Maskable> = Param::maskable("offset", 10.0,
         "Largest distance upwind at which a collider still shelters a CV. 0 shelters nothing.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 10.0);
@@ -43,8 +43,8 @@ params! { PARAMS:
          1 even partly sheltered curves become calm.")
         .at_least(0.0).soft(0.0, 1.0);
     DISTANCE: Param<f32> = Param::float("distance", 0.0,
-        "Distance over which the lee fades: a collider this far upwind no longer shelters a CV, one beside it shelters \
-         it fully. 0 shelters alike at any distance up to `offset`.")
+        "Distance over which the lee fades: a collider this far upwind no longer shelters a CV, one right next to it \
+         shelters it fully. 0 shelters alike at any distance up to `offset`.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 10.0);
     FALLOFF: Param<f32> = Param::float("falloff", 1.0,
         "How shelter fades over `distance`: at 1 evenly, above 1 soon behind the collider, below 1 late. At a distance s \

@@ -32,7 +32,8 @@ params! { PARAMS:
     SHAPE: Param<ShapeChoice> = Param::choice("shape", ControlShape::Sphere, "The shape of the region.");
     TRANSLATE: Param<[f64; 3]> = Param::dvec3("translate", [0.0; 3], "Position of the centre.").unit(Unit::Metres);
     ROTATE: Param<Turn> = Param::rotation("rotate",
-        "Rotates the region about its centre: about x, then y, then z. Between keys it rotates about a single axis.");
+        "Rotates the region about its centre: about x, then y, then z. Between two keys the rotation is interpolated \
+            about one common axis.");
     SCALE: Param<[f64; 3]> = Param::dvec3("scale", [1.0; 3],
         "Radius of the sphere, or half the edge of the inner cube, along its own x, y and z axes. If any is 0, the \
          region is empty.")
@@ -41,12 +42,12 @@ params! { PARAMS:
         "Size of the outer cube relative to the inner one. At 1 both are the same, and the influence ends abruptly.")
         .at_least(1.0).soft(1.0, 10.0).when(|params| is_cubes(params) && params.get(OUTER_SCALE).contains(&0.0));
     OUTER_SCALE: Param<[f64; 3]> = Param::dvec3("outer_scale", [0.0; 3],
-        "Half the edge of the outer cube along its own x, y and z axes, whatever the size of the inner one. Along an axis \
-         where this is 0, `outer` gives it.")
+        "Half the edge of the outer cube along its own x, y and z axes, whatever the size of the inner one. Along an \
+         axis where this is 0, `outer` sets the size.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 100.0).when(is_cubes);
     OUTER_TRANSLATE: Param<[f64; 3]> = Param::dvec3("outer_translate", [0.0; 3],
-        "Position of the outer cube's centre relative to that of the inner one, along the region's own axes: a gust \
-         that rises steeply at its front and fades slowly behind. The inner cube must stay inside.")
+        "Position of the outer cube's centre relative to that of the inner one, along the region's own axes: use it for \
+         a gust that rises steeply at its front and fades slowly behind. The inner cube must stay inside.")
         .unit(Unit::Metres).soft(-10.0, 10.0).when(is_cubes);
     RAMP: Param<Arc<Ramp>> = Param::ramp("ramp", &[[0.0, 1.0], [0.5, 1.0], [1.0, 0.0]],
         "Strength of the wind within the region, from its centre (0) to its boundary (1). For cubes the inner boundary \

@@ -19,13 +19,13 @@ use pairs::{DiffSide, Pair, pairs, usd_pairs};
 /// The arguments of `diff`.
 #[derive(Debug, clap::Args)]
 pub struct DiffArgs {
-    /// An obj, ply, json or USD file, a folder of them, or a numbered sequence: fur.####.json. A USD file is compared at
-    /// each time at which it has samples, also with a sequence
+    /// An obj, ply, json or USD file, a folder of them, or a numbered sequence: fur.####.json. A USD file is compared
+    /// at each of its time samples, even when compared with a sequence
     a: PathBuf,
     /// The file, folder or sequence to compare it with; the formats may differ
     b: PathBuf,
-    /// Floats that differ by at most this are the same, in the attribute's unit (metres for `P`); without it all bits
-    /// are compared. Integers are always compared exactly
+    /// Floats that differ by at most this much, in the attribute's unit (metres for `P`), count as equal; without it
+    /// all bits are compared. Integers are always compared exactly
     #[arg(long, value_name = "T", value_parser = tolerance)]
     tolerance: Option<f64>,
     /// Print as JSON

@@ -31,7 +31,7 @@ pub struct PictureArgs {
     /// Numeric attribute, or component of one, to show as colour: width, P.y
     #[arg(long, value_name = "ATTRIBUTE")]
     pub(super) color_by: Option<String>,
-    /// Cut pictures open at a plane, such as x=0; what has more than that x is not drawn
+    /// Cut pictures open at a plane, such as x=0; geometry beyond it, at x > 0, is not drawn
     #[arg(long, value_name = "AXIS=VALUE", allow_hyphen_values = true)]
     pub(super) clip: Option<Clip>,
 }

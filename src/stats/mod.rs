@@ -19,7 +19,7 @@ pub struct StatsArgs {
     /// The time code at which a USD file is read; its first sample by default
     #[arg(long, value_name = "F")]
     frame: Option<f64>,
-    /// The prim of a USD file that is read, with all under it: /set/fur
+    /// The prim of a USD file to read, with its descendants: /set/fur
     #[arg(long, value_name = "PATH")]
     prim: Option<String>,
     /// Print as JSON, with all digits (text has six)

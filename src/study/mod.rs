@@ -52,14 +52,16 @@ use outcome::{Goal, Outcome};
 pub struct StudyArgs {
     /// The graph file; - reads it from stdin
     graph: PathBuf,
-    /// A param and the values to compare, from coarse to fine: wind.rotation_steps=4,8,16; repeatable. The last value counts as
-    /// the best, unless the node declares the other direction or its results show it. Runs are compared with a reference one
-    /// step beyond the best, or with an exact method where the node has one. Without knobs, the graph's are listed
+    /// A param and the values to compare, from coarse to fine: wind.rotation_steps=4,8,16; repeatable. The last value
+    /// counts as the best, unless the node declares or its results show the opposite direction. Runs are compared with
+    /// a reference one step beyond the best, or with an exact method where the node has one. Without --knob, the
+    /// graph's knobs are listed
     #[arg(long = "knob", value_name = "NODE.PARAM=V,V,…")]
     knobs: Vec<KnobArg>,
-    /// Instead of a comparison: cook the graph with each param of each node at both ends of its range, and print for each what
-    /// came of it: finite, refused (with the message) or capped (with what a node could not meet). All outputs, unless --output
-    /// names one; the scene's first 24 frames, unless --frames says which. Exit code 4 if anything else comes of one
+    /// Instead of a comparison: cook the graph with each param of each node at both ends of its range, and print each
+    /// outcome: finite, refused (with the message) or capped (with what a node could not meet). Cooks all outputs
+    /// unless --output names one, and the scene's first 24 frames unless --frames is given. Exit code 4 for any other
+    /// outcome
     #[arg(long, conflicts_with_all = ["knobs", "norm", "tolerance", "budget", "out", "repeats", "fresh"])]
     extremes: bool,
     /// With --extremes: the longest that each cook may take; what takes longer is stopped, and its frames so far are reported
@@ -94,14 +96,14 @@ pub struct StudyArgs {
     /// Override a param (node.param=VALUE) or a control (name=VALUE) in all runs; repeatable
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Setting>,
-    /// Cook each setting this many times, one after the other in rounds, and take the least time; of a search only those that may be
-    /// its pick [default: 3, fewer where a run takes seconds]
+    /// Cook each setting this many times, in rounds, and take the least time; a search (see --tolerance) repeats only
+    /// settings that it may pick [default: 3, fewer where a run takes seconds]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeats: Option<u32>,
-    /// Do not use the runs that NAME.study has
+    /// Ignore the runs stored in NAME.study
     #[arg(long)]
     fresh: bool,
-    /// Number of threads [default: the machine's]
+    /// Number of threads [default: as many as the machine has]
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true, value_parser = clap::value_parser!(u16).range(0..=1024))]
     threads: u16,
     /// Memory for the results that a frame needs, such as 8G [default: half of the machine's]

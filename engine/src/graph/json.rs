@@ -247,7 +247,7 @@ impl<'a> Json<'a> {
         match number.value.parse::<f64>() {
             Ok(x) if x.is_finite() => Ok(x),
             _ => {
-                let fault = self.fault(code::NUMBER_SIZE, format!("{} is too large for a number", shown(number.value)));
+                let fault = self.fault(code::NUMBER_SIZE, format!("{} is too large", shown(number.value)));
                 Err(fault.hint("expected a number within ±1.7e308"))
             }
         }
@@ -261,7 +261,7 @@ impl<'a> Json<'a> {
             Some(whole) => Ok(whole),
             None if x.fract() != 0.0 => Err(self.unexpected(expected).hint(format!("the nearest is {}", x.round()))),
             None => Err(self
-                .fault(code::NUMBER_SIZE, format!("{} is too large for a whole number", shown(number.value)))
+                .fault(code::NUMBER_SIZE, format!("{} is too large", shown(number.value)))
                 .hint("expected a whole number within ±9.2e18")),
         }
     }

@@ -78,8 +78,8 @@ impl Metric {
     /// The share of curves whose tips jump. The engine computes it, and the node does not publish it.
     pub const fn jumps() -> Self {
         let help = "Share of curves whose tip moves by more than a quarter of the curve's length from one requested \
-            sample to the next. In the report only; the first sample has none. Fast motion counts too: request eighths \
-            of a frame to see jumps alone.";
+            sample to the next. Only in the report, from the second sample on. Fast motion counts too: cook at steps of \
+            1/8 frame to count jumps only.";
         Self { is_of_jumps: true, ..Self::new("jumps", Unit::None, help) }
     }
 

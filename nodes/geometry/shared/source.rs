@@ -10,7 +10,8 @@ use std::sync::Arc;
 pub(crate) const COMPONENTS: Metric = Metric::new(
     "components",
     Unit::None,
-    "Components of the file: curves, mesh, points, tets. Notes name files with some that no node reads.",
+    "Number of components in the file: curves, mesh, points, tets. A note names each file with components that no node \
+        reads.",
 );
 
 /// The component of `kind` in a file; other geometry is ignored, but counted.

@@ -14,8 +14,8 @@ use std::sync::Arc;
 pub(crate) const NAME: Param<Name> = Param::text(
     "clump",
     "",
-    "Name of an attribute of curves, whole numbers, be they integers or floats: curves with the same number move \
-     together, those below 0 alone. If empty, `clump_radius` may find clumps.",
+    "Name of a curve attribute with whole-number values (integer or float): curves with the same number move together, \
+     curves with a number below 0 alone. If empty, `clump_radius` may find clumps.",
 )
 .fixed();
 
@@ -23,8 +23,8 @@ pub(crate) const NAME: Param<Name> = Param::text(
 pub(crate) const RADIUS: Param<f32> = Param::float(
     "clump_radius",
     0.0,
-    "Distance of roots within which curves move together, if `clump` names no attribute: clumps are found at the scene's \
-     first frame, and are about this far apart. 0 finds none.",
+    "Distance between roots within which curves move together, if `clump` is empty. Clumps are found at the scene's \
+     first frame and are about this far apart. 0 makes none.",
 )
 .unit(Unit::Metres)
 .at_least(0.0)

@@ -75,12 +75,15 @@ impl<'a> Document<'a> {
         {
             let fault = json.fault(
                 code::FORMAT,
-                format!("the graph has format {number}, this version of convect reads format {FORMAT}"),
+                format!("the graph has format {number}, but this version of convect reads format {FORMAT}"),
             );
             // In another format everything else may have another meaning.
             faults.clear();
-            let hint =
-                if number > FORMAT { "it was made for a newer version of convect" } else { "write \"convect\": 1" };
+            let hint = if number > FORMAT {
+                "the graph was made for a newer one: update convect"
+            } else {
+                "write \"convect\": 1"
+            };
             faults.push(fault.hint(hint));
             return None;
         }

@@ -51,7 +51,7 @@ fn file<'a>(entry: &Entry<'a>, nodes: &Nodes<'_, 'a>, faults: &mut Vec<Fault>) -
         return output(&entry.json, &name, nodes, EXPECTED, faults).into_iter().collect();
     };
     if items.is_empty() {
-        let fault = entry.json.fault(code::NO_OUTPUTS, "the list is empty, so its file would be too");
+        let fault = entry.json.fault(code::NO_OUTPUTS, "the list is empty, so the file would be too");
         faults.push(fault.hint("list the nodes that it holds: [\"id\", …]"));
     }
     let mut names = BTreeSet::new();
