@@ -52,7 +52,7 @@ Functions
   step(edge, x)                   0 if x < edge, else 1
   smoothstep(low, high, x)        0 if x < low, 1 if x > high, smooth between
   fit(x, a, b, c, d)              maps range a..b to range c..d, clamped
-  noise(P)   noise(x, y, z)       smooth noise, about -1..1, 0 where all coordinates are whole; depends on the seed
+  noise(P)   noise(x, y, z)       smooth noise, about -1..1, 0 at whole x, y, z; depends on the seed
   rand(i)   rand(i, j)            random number, 0 <= r < 1, for i and j; depends on the seed
   vec(x, y, z)   vec(x, y, z, w)  a vector; vec(x) is vec(x, x, x)
   length(v)   distance(a, b)   dot(a, b)   cross(a, b)
