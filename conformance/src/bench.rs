@@ -145,7 +145,7 @@ impl Bench {
     /// The frame that [`Bench::cook`] cooks; by default 1.
     #[must_use]
     pub fn at(mut self, frame: f64) -> Self {
-        self.frame = Frame::exactly(frame).expect("a frame");
+        self.frame = Frame::exactly(frame).expect("a test asks for frames in range, in whole ticks");
         self
     }
 
@@ -188,7 +188,8 @@ impl Bench {
     /// If the node refuses one of them.
     pub fn try_frames(&self, frames: &[Frame]) -> Result<Vec<BenchResult>, Arc<CookError>> {
         let graph = self.graph();
-        let engine = Engine::new(&Settings { threads: self.threads, ..Settings::default() }).expect("threads");
+        let engine = Engine::new(&Settings { threads: self.threads, ..Settings::default() })
+            .expect("the system starts a few threads");
         let engine = engine.comparing_samples(true);
         let (found, report) = cook_all(&engine, &graph, frames);
         if let Some((_, error, _)) = report.errors.into_iter().next() {

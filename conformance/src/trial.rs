@@ -107,7 +107,7 @@ fn with_engine<T>(threads: usize, cook: impl FnOnce(&Engine) -> T) -> T {
     };
     // Without a cache, so that no trial finds results of an earlier one.
     let settings = Settings { threads, memory: 0, ..Settings::default() };
-    let engine = take().unwrap_or_else(|| Engine::new(&settings).expect("threads"));
+    let engine = take().unwrap_or_else(|| Engine::new(&settings).expect("the system starts a few threads"));
     let result = cook(&engine);
     idle().push((threads, engine));
     result
@@ -127,7 +127,7 @@ impl Subject {
             Cook::Window(..) => &[1.0, 3.0, 12.0],
             Cook::Solver(..) => &[1.0, 2.0, 3.0],
         };
-        frames.iter().map(|frame| Frame::exactly(*frame).expect("a frame")).collect()
+        frames.iter().map(|frame| Frame::exactly(*frame).expect("these frames are whole ticks")).collect()
     }
 
     /// Whether the node depends on time.

@@ -239,7 +239,7 @@ metrics! { METRICS:
             the input that it is made for.");
     OUTSIDE = Metric::new("liquid_outside", Unit::None,
         "Largest share of any mesh wired to `liquid` that lay outside the box at the start, and was left out.")
-        .warn_last_above(0.01, "Part of a mesh at `liquid` lies outside the box, and was left out. If that is not meant, move the mesh, \
+        .warn_last_above(0.01, "A mesh at `liquid` lies outside the box, wholly or in part; what is outside was left out. If that is not meant, move it, \
             or make the box larger with `domain_from` and `domain_to`.");
     IN_COLLIDERS = Metric::new("liquid_in_colliders", Unit::None,
         "Largest share of a mesh at `liquid` that lay inside colliders at the start, and was left out.")
