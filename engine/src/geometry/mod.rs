@@ -59,6 +59,15 @@ impl Kind {
         }
     }
 
+    /// The name with its article, for sentences.
+    pub fn phrase(self) -> &'static str {
+        match self {
+            Self::Mesh => "a mesh",
+            Self::Volume => "a volume",
+            Self::Curves | Self::Points | Self::Tets => self.name(),
+        }
+    }
+
     /// An attribute of a component of this kind in words: `one float for each curve`, `one int3 for all`.
     pub fn rows_text(self, owner: Owner, rows: ColumnType) -> String {
         let row = match (owner, self) {

@@ -115,6 +115,7 @@ pub(super) fn unexpected(token: &Token<'_>, expected: &str) -> ExprError {
     let fault = token.position.fault(format!("expected {expected}, found {found}"));
     let after_value = expected.starts_with("an operator");
     match token.kind {
+        TokenKind::Symbol(Symbol::Assign) if expected.ends_with("after `let`") => fault.hint("write `let name = …`"),
         TokenKind::Symbol(Symbol::Assign) => fault.hint("to compare, write `==`"),
         TokenKind::Number(_) | TokenKind::Name(_) | TokenKind::Attribute(_) | TokenKind::Symbol(Symbol::Open)
             if after_value =>

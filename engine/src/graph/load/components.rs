@@ -91,7 +91,7 @@ impl Components {
                 listed(&kinds),
                 output.name
             );
-            let hint = "remove `bypass`, or connect what reads the node to another one";
+            let hint = "remove `bypass`, or connect the nodes that read this one to another";
             faults.push(bypass.fault(code::BYPASS, fact).hint(hint));
         }
     }
@@ -123,10 +123,11 @@ impl Components {
                     if !input.needs.hold(kinds) {
                         let link = wire.json.string().unwrap_or_default();
                         let fact = format!(
-                            "`{}` carries {}, but the input `{}` needs {kind}",
+                            "`{}` carries {}, but the input `{}` needs {}",
                             shown(link),
                             listed(kinds),
-                            input.name
+                            input.name,
+                            kind.phrase()
                         );
                         let hint = self.provider(wire, kind, drafts, catalogue);
                         faults.push(Fault { hint, ..wire.json.fault(code::WRONG_COMPONENT, fact) });
@@ -146,7 +147,7 @@ impl Components {
             .enumerate()
             .find(|(port, _)| self.of(wire.node, Some(*port)).is_some_and(|kinds| kinds.contains(&kind)));
         if let Some((_, output)) = sibling {
-            return Some(format!("`{}.{}` carries {kind}", shown(source.text.entry.name), output.name));
+            return Some(format!("`{}.{}` carries {}", shown(source.text.entry.name), output.name, kind.phrase()));
         }
         let gives = |carries: &Carries| matches!(carries, Carries::Kinds(kinds) if kinds.contains(&kind));
         let types: Vec<&str> = catalogue
@@ -155,12 +156,12 @@ impl Components {
             .map(|node| node.name)
             .take(NAMED)
             .collect();
-        (!types.is_empty()).then(|| format!("node types that output {kind}: `{}`", types.join("`, `")))
+        (!types.is_empty()).then(|| format!("node types that output {}: `{}`", kind.phrase(), types.join("`, `")))
     }
 }
 
-/// `curves and mesh`, or `nothing`.
+/// `curves and a mesh`, or `nothing`.
 fn listed(kinds: &[Kind]) -> String {
-    let names: Vec<&str> = kinds.iter().map(|kind| kind.name()).collect();
+    let names: Vec<&str> = kinds.iter().map(|kind| kind.phrase()).collect();
     if names.is_empty() { "nothing".into() } else { names.join(" and ") }
 }

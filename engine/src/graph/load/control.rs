@@ -87,22 +87,23 @@ impl<'a> Controls<'a> {
         self.all.iter().map(|control| control.name)
     }
 
-    /// Why an expression cannot read the control that `fact` names, if there is one of that name.
-    pub(super) fn why_unreadable(&self, fact: &str) -> Option<String> {
-        let is_named = |name: &&str| fact.contains(&format!("`{name}`"));
+    /// What is wrong, and why, where an expression's `unknown name` is that of a control.
+    pub(super) fn why_unreadable(&self, fact: &str) -> Option<(String, String)> {
+        let is_named = |name: &&str| fact == format!("unknown name `{name}`");
         let mut others = self.all.iter().filter(|control| !control.is_numeric);
-        if let Some(control) = others.find(|control| is_named(&control.name)) {
-            let name = shown(control.name);
-            return Some(match control.is_valid {
-                true => format!("the control `{name}` is neither a number nor a vector, so expressions cannot read it"),
-                false => format!("the control `{name}` has a fault"),
-            });
-        }
-        let name = self.unread.iter().rfind(|name| is_named(name))?;
-        Some(match self.unread.last() == Some(name) {
-            true => "a control reads only those before it, not itself".into(),
-            false => format!("a control reads only those before it; move `{}` up", shown(name)),
-        })
+        let (name, why) = match others.find(|control| is_named(&control.name)) {
+            Some(control) if control.is_valid => (control.name, "it is neither a number nor a vector".into()),
+            Some(control) => (control.name, "it has a fault of its own".into()),
+            None => {
+                let name = self.unread.iter().rfind(|name| is_named(name))?;
+                let why = match self.unread.last() == Some(name) {
+                    true => "a control can use the controls before it, not itself".into(),
+                    false => format!("a control can use the controls before it; move `{}` up", shown(name)),
+                };
+                (*name, why)
+            }
+        };
+        Some((format!("the control `{}` cannot be used here", shown(name)), why))
     }
 }
 

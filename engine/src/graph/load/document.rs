@@ -112,10 +112,17 @@ impl<'a> Document<'a> {
             return match self.controls.iter_mut().find(|control| control.name == key) {
                 Some(control) => *control = Entry::of_set(control.name, value.at_path(&path)),
                 None => {
-                    let fault = value.fault(code::UNKNOWN_SET, format!("there is no control `{}`", shown(key)));
+                    let fact = match key {
+                        "" => "the name before `=` is missing".into(),
+                        _ => format!("there is no control `{}`", shown(key)),
+                    };
+                    let fault = value.fault(code::UNKNOWN_SET, fact);
                     let names = self.controls.iter().map(|control| control.name);
                     let hint = match self.nodes.iter().any(|node| node.entry.name == key) {
                         true => Some(format!("`{0}` is a node; set one of its params with `{0}.param=…`", shown(key))),
+                        false if self.controls.is_empty() => {
+                            Some("a param of a node is set with `node.param=…`".into())
+                        }
                         false => did_you_mean(faults, key, names, "controls"),
                     };
                     faults.push(Fault { hint, ..fault });

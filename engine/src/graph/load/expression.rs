@@ -190,6 +190,9 @@ fn explain(json: &Json<'_>, text: &str, noun: &str, controls: &Controls<'_>, err
         return Fault { hint, ..json.fault(code::EXPRESSION, fact) };
     }
     let position = if line > 1 { format!("line {line}, column {column}") } else { format!("column {column}") };
-    let hint = controls.why_unreadable(&fact).or(hint);
+    let (fact, hint) = match controls.why_unreadable(&fact) {
+        Some((fact, why)) => (fact, Some(why)),
+        None => (fact, hint),
+    };
     Fault { hint, ..json.fault_at(offset, code::EXPRESSION, format!("{fact}, at {position} of the {noun}")) }
 }

@@ -178,7 +178,7 @@ fn column(name: &str, json: &Json<'_>) -> Result<Column, Fault> {
     let kind = match fixed_type(name) {
         Some(kind) if rows.is_empty() || kind.width() == width => kind,
         Some(kind) => {
-            let fault = json.fault(code::WRONG_KIND, format!("`{name}` has {} per row", counted(width, "number")));
+            let fault = json.fault(code::WRONG_KIND, format!("`{name}` has {} per element", counted(width, "number")));
             return Err(fault.hint(format!("expected {}", counted(kind.width(), "number"))));
         }
         None => match (width, rows.iter().all(is_whole)) {
@@ -189,7 +189,7 @@ fn column(name: &str, json: &Json<'_>) -> Result<Column, Fault> {
             (3, true) => ColumnType::I3,
             (4, true) => ColumnType::I4,
             _ => {
-                let fact = format!("`{}` has {} per row", shown(name), counted(width, "number"));
+                let fact = format!("`{}` has {} per element", shown(name), counted(width, "number"));
                 return Err(json.fault(code::WRONG_KIND, fact).hint("expected 1, 3 or 4"));
             }
         },

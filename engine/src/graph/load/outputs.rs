@@ -52,7 +52,7 @@ fn file<'a>(entry: &Entry<'a>, nodes: &Nodes<'_, 'a>, faults: &mut Vec<Fault>) -
     };
     if items.is_empty() {
         let fault = entry.json.fault(code::NO_OUTPUTS, "the list is empty, so the file would be too");
-        faults.push(fault.hint("list the nodes that it holds: [\"id\", …]"));
+        faults.push(fault.hint("list the nodes to write: [\"id\", …]"));
     }
     let mut names = BTreeSet::new();
     let mut drafts = Vec::with_capacity(items.len());
@@ -63,7 +63,7 @@ fn file<'a>(entry: &Entry<'a>, nodes: &Nodes<'_, 'a>, faults: &mut Vec<Fault>) -
         if !names.insert(draft.name.clone()) {
             let prim = draft.name.split_once('/').map_or("", |(_, prim)| prim);
             let fault = json.fault(code::DOUBLED_OUTPUT, format!("`{}` is in the list twice", shown(prim)));
-            faults.push(fault.hint("each is a prim of its own, named after it; remove one"));
+            faults.push(fault.hint("each node becomes a prim with the node's name; remove one"));
         }
         drafts.push(draft);
     }

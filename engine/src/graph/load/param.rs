@@ -90,7 +90,7 @@ impl<'a> Reader<'a, '_> {
         if spec.facts.fixed && source.is_animated() {
             let fault = json.fault(code::NOT_ANIMATED, format!("`{}` cannot be animated", spec.name));
             self.faults.push(fault.hint(format!(
-                "expected {}, without keyframes and without expressions of time",
+                "expected {} that stays the same: no keyframes, and no expression that reads the time",
                 spec.shape.describe()
             )));
             return None;
@@ -104,7 +104,7 @@ impl<'a> Reader<'a, '_> {
             (Ast::Object(_), _) => self.form(spec, json, within),
             (_, Shape::Code) => expression::code(json, self.controls, self.faults),
             (_, Shape::File) => self.file(json),
-            (Ast::Array(_) | Ast::NumberLit(_), Shape::Ramp) => {
+            (_, Shape::Ramp) => {
                 self.faults.push(bare_ramp(json));
                 None
             }
@@ -260,7 +260,7 @@ impl<'a> Reader<'a, '_> {
             return None;
         };
         let Some(name) = attribute.json.string().filter(|name| !name.is_empty()) else {
-            self.faults.push(attribute.json.unexpected("the name of a point attribute"));
+            self.faults.push(attribute.json.unexpected("the name of an attribute"));
             return None;
         };
         Some(match source? {
@@ -303,7 +303,10 @@ impl<'a> Reader<'a, '_> {
             Lookup::Faulty => None,
             Lookup::Nothing => {
                 let fault = name.fault(code::UNKNOWN_CONTROL, format!("there is no control `{}`", shown(text)));
-                let hint = did_you_mean(self.faults, text, self.controls.names(), "controls");
+                let hint = match self.controls.names().next() {
+                    Some(_) => did_you_mean(self.faults, text, self.controls.names(), "controls"),
+                    None => Some("add it to `controls`".into()),
+                };
                 self.faults.push(Fault { hint, ..fault });
                 None
             }
@@ -349,6 +352,7 @@ fn bare_ramp(json: &Json<'_>) -> Fault {
     let fault = json.unexpected(&Shape::Ramp.describe());
     let range = json.value.range();
     match &json.text.content[range.start..range.end] {
+        _ if !matches!(json.value, Ast::Array(_) | Ast::NumberLit(_)) => fault,
         text if json.elements().is_none() => {
             fault.hint(format!("write a constant ramp as {{\"ramp\": [[0, {}]]}}", shown(text)))
         }
