@@ -39,7 +39,7 @@ pub struct JobArgs {
     /// Frames of a part [default: at least 16, a multiple of the spacing at which windows start]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     chunk: Option<u32>,
-    /// Cook the whole once for each of these values: node.param=V1,V2 or a control; a value with commas as a list of JSON
+    /// Cook everything once for each of these values: node.param=V1,V2 or control=V1,V2; values with commas inside as one JSON list
     #[arg(long, value_name = "KEY=VALUES")]
     wedge: Option<Setting>,
     /// Override a param (node.param=VALUE) or a control (name=VALUE): JSON or a bare word, such as wind.noise=billow; repeatable

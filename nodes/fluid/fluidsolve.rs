@@ -94,8 +94,8 @@ params! { PARAMS:
         "Mass per volume: water 1000, honey 1400. Denser liquid flows faster at the same viscosity.")
         .unit(Unit::KilogramsPerCubicMetre).above(0.0).soft(100.0, 3000.0);
     VISCOSITY: Param<f64> = Param::double("viscosity", 1.0,
-        "Dynamic viscosity: water 0.001, oil 0.1, syrup 1, honey 10, batter 20, ketchup 100, peanut butter 1e3, pitch 1e8. 0 \
-         leaves it out.")
+        "Dynamic viscosity: water 0.001, oil 0.1, syrup 1, honey 10, batter 20, ketchup 100, peanut butter 1e3, pitch 1e8. 0: \
+         no viscosity.")
         .unit(Unit::PascalSeconds).at_least(0.0).soft(0.0, 1e3).history();
     SURFACE_TENSION: Param<f64> = Param::double("surface_tension", 0.0, "Surface tension; not available yet.")
         .unit(Unit::NewtonsPerMetre).at_least(0.0).soft(0.0, 0.1);
@@ -143,8 +143,8 @@ const SURFACE: Output = Output::new(
 const PARTICLES: Output = Output::new(
     "particles",
     &[Kind::Points],
-    "The markers on the surface (`kind` 0), drops too small for the grid (`kind` 1) and tracers (`kind` 3), with `id`, \
-     `v`, `N`, `volume`, `viscosity`, `density`, and the float attributes on the points of `liquid`, `sources` and \
+    "The markers on the surface (`kind` 0), drops too small for the grid (`kind` 1) and tracers (`kind` 3; 2 is not used \
+     yet), with `id`, `v`, `N`, `volume`, `viscosity`, `density`, and the float attributes on the points of `liquid`, `sources` and \
      `tracers`.",
 );
 const VOLUME: Output =

@@ -97,11 +97,10 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     }
     if let Some((kind, name, row)) = not_finite(&geometry) {
         let fact = format!(
-            "`{}` has a NaN or infinity: `{name}` of the {kind} in row {row}, counted from 0",
+            "`{}` has a NaN or infinity: `{name}` of the {kind} at index {row}, counted from 0",
             file.path().display()
         );
-        let hint =
-            "`convect stats FILE --frame F` counts them by attribute; mend the file, or name a `prim` without them";
+        let hint = "`convect stats FILE --frame F` counts NaNs and infinities by attribute; repair the file, or name a `prim` without any";
         return Err(Error::file(fact).hint(hint));
     }
     cx.publish(COMPONENTS, geometry.kinds().count() as f64);

@@ -106,7 +106,7 @@ metrics! { METRICS:
         .warn_above(0.02, "Many tets are too flat to preserve their volume: where they lie, the body is held by springs \
             alone. Set `interior`, or give the surface smaller and more even faces where it is thin.");
     REPAIRS = Metric::new("repairs", Unit::None,
-        "Number of points merged or removed, and of faces removed, trimmed or reoriented.");
+        "Number of points merged or removed, and of faces removed, freed of repeated corners or reoriented.");
     LOST_PIECES = Metric::new("lost_pieces", Unit::None,
         "Connected pieces of the surface of which repairs left no face.")
         .warn_above(0.0, "These pieces of the surface get no tets: they are so small next to the whole surface (less than \

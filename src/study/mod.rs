@@ -70,7 +70,7 @@ pub struct StudyArgs {
     /// One of these cooks, in a process of its own.
     #[arg(long, hide = true, value_name = "KEY=VALUE", requires = "extremes")]
     extreme: Option<String>,
-    /// The output to compare [default: the only one]
+    /// The output to compare [default: the graph's output, if it has one only]
     #[arg(long, value_name = "NAME")]
     output: Option<String>,
     /// Frames to cook: 1-48, 1-48x2 (every second), 10, 10.5, 1- (to the scene's end), or a list: 1-4,10 [default: the scene's frames]

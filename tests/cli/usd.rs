@@ -167,7 +167,7 @@ fn a_number_that_is_not_finite_is_refused_by_file_attribute_and_row() {
         "#usda 1.0\n(\n metersPerUnit = 1\n)\ndef Points \"p\" {\n point3f[] points = [(0, 0, 0), (0, nan, 0)]\n}\n";
     bench.write("in.usda", text);
     let ran = bench.run(&["cook", "g.json"]);
-    let expected = "g.json:1:69: nodes.a.params.file: `in.usda` has a NaN or infinity: `P` of the points in row 1, counted from 0; \
-                    `convect stats FILE --frame F` counts them by attribute; mend the file, or name a `prim` without them\n";
+    let expected = "g.json:1:69: nodes.a.params.file: `in.usda` has a NaN or infinity: `P` of the points at index 1, counted from 0; \
+                    `convect stats FILE --frame F` counts NaNs and infinities by attribute; repair the file, or name a `prim` without any\n";
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), expected));
 }

@@ -36,7 +36,7 @@ Operators, highest precedence first
   == !=
   &&
   ||
-  a ? b : c        b if a is not 0, else c; the other value has no effect
+  a ? b : c        b if a is not 0, else c; the other may be NaN
 
 Functions
   sin cos tan asin acos atan(x)   atan2(y, x)   radians(degrees)   degrees(radians)

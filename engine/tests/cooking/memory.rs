@@ -112,7 +112,7 @@ fn a_metric_that_is_no_number_is_left_out_with_a_note() {
     let metrics = &cooked.node("unsure").metrics["unsure"];
     assert_eq!(metrics.iter().map(|(frame, value)| (frame.number(), *value)).collect::<Vec<_>>(), [(1.0, 0.5)]);
     let notes: Vec<String> = cooked.report.notes.iter().map(ToString::to_string).collect();
-    assert_eq!(notes, ["`unsure` (Unsure) has no `unsure` at frame 2, where it is infinite"]);
+    assert_eq!(notes, ["`unsure` (Unsure) reports no `unsure` at frame 2, because it is infinite"]);
 }
 
 /// A graph with all kinds of nodes and a few thousand points.

@@ -219,8 +219,8 @@ pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Res
         cx.reserve(least * bytes, "use larger cells, or less liquid")?;
         let shape = MeshShape::new(&topology, &points, &settings);
         if least > LEAST_SHOWN && is_unseen(&shape, [low, high], &points) {
-            let fact = format!("{what} is thinner than the surface's cells everywhere, so no cell holds any of it");
-            return Err(Error::refused(fact).hint("use smaller cells, raise `resolution`, or leave it out"));
+            let fact = format!("{what} is thinner everywhere than the surface's cells, so none of it is seen");
+            return Err(Error::refused(fact).hint("use smaller cells, raise `resolution`, or remove the mesh"));
         }
         let volume = (topology.open_triangles() == 0).then(|| enclosed(mesh, &points));
         found.push(StartMesh::new(&points, volume));

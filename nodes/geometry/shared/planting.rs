@@ -42,6 +42,7 @@ impl Planting<'_> {
         let most = (unmasked * most_share).round();
         let cvs = self.cvs as f64;
         if most * cvs > MOST_CVS {
+            let [most, area] = [most, area].map(|x| if x < 1e16 { x.to_string() } else { format!("{x:.2e}") });
             let fact = format!("{most} curves of {cvs} CVs would grow on {area} m², more than {MOST_CVS} CVs");
             return Err(Error::refused(fact).hint("lower `density` or `cvs`, or scale the skin to metres"));
         }

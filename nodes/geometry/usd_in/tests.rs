@@ -98,8 +98,8 @@ fn numbers_that_are_not_finite_are_refused_by_file_and_attribute() {
     let (_folder, file) = stage(&STAGE.replace("float[] widths = [0.5]", "float[] widths = [nan]"));
     let error = bench(&NODE).source(FILE.name(), file).try_cook().unwrap_err();
     assert!(
-        error.fact.ends_with("in.usda` has a NaN or infinity: `width` of the curves in row 0, counted from 0"),
+        error.fact.ends_with("in.usda` has a NaN or infinity: `width` of the curves at index 0, counted from 0"),
         "{error}"
     );
-    assert!(error.hint.unwrap().starts_with("`convect stats FILE --frame F` counts them"));
+    assert!(error.hint.unwrap().starts_with("`convect stats FILE --frame F` counts NaNs"));
 }

@@ -270,7 +270,7 @@ impl SimulationSetup {
 pub(super) fn refusal(error: BodyError) -> Error {
     let hint = match error {
         BodyError::Point(_) => "points of `bodies` need finite positions",
-        BodyError::NoMass => "give `density` a value above 0 where the bodies have tets with a volume",
+        BodyError::NoMass => "raise `density` where tets have a volume, or replace the flat tets",
         BodyError::Particles { .. } => "a tet needs four different points",
         BodyError::Number { .. } => "`density`, `stiffness`, `damping` and their masks need finite numbers",
     };

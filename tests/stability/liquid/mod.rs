@@ -128,7 +128,7 @@ impl Row {
         }
         let settings = Settings {
             threads,
-            ceiling: Ceiling { bytes: self.memory, set_by: "the row allows" },
+            ceiling: Ceiling { bytes: self.memory, set_by: "this row of the table allows" },
             ..Settings::default()
         };
         let frames: Vec<Frame> = (1..=frames()).map(Frame::whole).collect();

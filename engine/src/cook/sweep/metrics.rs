@@ -21,7 +21,8 @@ impl Sweep<'_, '_, '_> {
                 if self.nodes[node].left_out_metrics.insert(name) {
                     let (id, type_name) = (&self.plan.graph.nodes[node].id, self.nodes[node].report.type_name);
                     let what = if value.is_nan() { "undefined" } else { "infinite" };
-                    let note = format!("`{id}` ({type_name}) has no `{name}` at frame {frame}, where it is {what}");
+                    let note =
+                        format!("`{id}` ({type_name}) reports no `{name}` at frame {frame}, because it is {what}");
                     self.report.notes.push(Note::new(name, note).of_node(id).at(vec![frame]));
                 }
                 continue;

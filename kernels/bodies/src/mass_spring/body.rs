@@ -107,7 +107,7 @@ pub enum BodyError {
         value: f64,
     },
     /// The total mass is zero.
-    #[error("the body has no mass; expected a tetrahedron with a volume and a density above 0")]
+    #[error("the body has no mass; expected at least one tet with a volume and a density above 0")]
     NoMass,
 }
 
