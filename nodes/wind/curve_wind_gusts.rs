@@ -16,7 +16,8 @@
 //! * Each gust may also blow to a side of its own (`shear`): across the wind that launched it, in a direction drawn once.
 //!   `gust_dir` is the sum over all gusts of influence · `shear` · that direction. Gusts placed by hand have none.
 //! * With `loop` all gusts come again with the same random numbers, so that frame f + `loop` has the envelope of frame f
-//!   where params do not differ. `repeat_every` is rounded so that the loop has a whole number of repetitions.
+//!   where params do not differ. `repeat_every` is rounded so that the loop has a whole number of repetitions. Before
+//!   frame 0 params are held, so gusts sent then repeat with a constant wind alone; `unlooped_gusts` counts the others.
 
 use crate::shared::clump;
 use crate::shared::direction::{GUST_DIR, unit_direction};
@@ -78,7 +79,8 @@ params! { PARAMS:
         .unit(Unit::Frames).at_least(0.0).soft(0.0, 240.0).when(is_asked);
     LOOP: Param<f64> = Param::double("loop", 0.0,
         "Number of frames after which the same gusts repeat, for a cycle that can be looped; keyed params must repeat \
-         too. `repeat_every` is then adjusted so that it divides the loop. 0 does not loop.")
+         too. Where `wind_dir` or `speed_range` is keyed, frames repeat once the gusts sent before frame 0 have faded. \
+         `repeat_every` is adjusted so that it divides the loop. 0 does not loop.")
         .unit(Unit::Frames).within(0.0, 1e9).soft(0.0, 240.0).when(is_asked);
     FALLOFF: Param<Arc<Ramp>> = Param::smooth_ramp("falloff", &[[0.0, 1.0], [1.0, 0.0]],
         "Strength of the wind within a gust, from its centre (0) to its boundary (1): 1 is the full wind.")
@@ -122,6 +124,11 @@ metrics! { METRICS:
         .warn_above(0.0,
         "More than 65,536 gusts would blow at the same time, so the oldest are missing. Lower `num_gusts`, \
          `life_range` or `decay_range`, or raise `repeat_every`.");
+    UNLOOPED_GUSTS = Metric::new("unlooped_gusts", Unit::None,
+        "With `loop`: blowing gusts that were sent before frame 0, although the wind has changed since.")
+        .warn_above(0.0,
+        "With `loop`, these frames do not repeat: gusts blow in them that were sent before frame 0, where params are held, \
+         although the wind has changed since. Use frames after these as the cycle, or do not animate the wind.");
 }
 
 pub(crate) static NODE: Node = Node::new(
@@ -168,6 +175,7 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
     let sent = if (full && !shears) || !sends(cx.params()) { Sent::default() } else { sent(cx) };
     cx.publish(ACTIVE_GUSTS, sent.spheres.len() as f64);
     cx.publish(DROPPED_GUSTS, sent.dropped as f64);
+    cx.publish(UNLOOPED_GUSTS, sent.unlooped as f64);
     let group = Group::of(&cx.get(GROUP), &curves)?;
     let felt = felt(cx, &curves, group.as_ref(), &controls, &sent, [!full, shears])?;
     let incoming = curves.get(ENVELOPE);
@@ -307,6 +315,8 @@ struct Sent {
     sides: Vec<[f32; 3]>,
     /// How many were left out.
     dropped: u64,
+    /// How many will not come again, although the gusts loop.
+    unlooped: usize,
 }
 
 fn sent(cx: &FrameCx) -> Sent {
@@ -356,7 +366,21 @@ fn sent(cx: &FrameCx) -> Sent {
         (sphere, side)
     };
     let (spheres, sides) = living.gusts.iter().map(sphere).unzip();
-    Sent { spheres, sides, dropped: living.dropped }
+    let old = living.gusts.iter().filter(|gust| gust.start < 0.0).count();
+    let unlooped = if cx.get(LOOP) > 0.0 && has_turned(cx) { old } else { 0 };
+    Sent { spheres, sides, dropped: living.dropped, unlooped }
+}
+
+/// Whether the wind that gusts travel with has changed since frame 0.
+fn has_turned(cx: &FrameCx) -> bool {
+    if cx.frame().number() <= 0.0 {
+        return false;
+    }
+    let [held, now] = [cx.integrands::<3>(0.0), cx.integrals::<3>(cx.frame())];
+    held.iter().zip(&now).any(|(held, now)| {
+        let held = DVec3::from(*held) * cx.seconds();
+        (held - DVec3::from(*now)).norm() > 1e-9 * held.norm().max(1.0)
+    })
 }
 
 /// The wind at a whole frame at which gusts start, and over the frame before it.

@@ -48,6 +48,24 @@ fn a_loop_repeats_its_frames() {
 }
 
 #[test]
+fn a_loop_with_a_keyed_wind_repeats_once_the_gusts_from_before_frame_0_are_gone() {
+    let turn = |half: i32| (f64::from(1 + 24 * half), if half % 2 == 0 { [1.0, 0.0, 0.0] } else { [0.0, 0.0, 1.0] });
+    let turns: Vec<_> = (0..20).map(turn).collect();
+    let gusts = crowd().set(LOOP, 48.0).set(LIFE_RANGE, span(40.0, 40.0)).keyed(WIND_DIR, &turns);
+    let apart = |frame: f64| {
+        let [now, later] = [frame, frame + 48.0].map(|frame| gusts.clone().at(frame).cook());
+        let far = envelope(&now).iter().zip(envelope(&later)).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        (far, now.metrics["unlooped_gusts"])
+    };
+    let (far, counted) = apart(13.0);
+    assert!(far > 0.1 && counted > 0.0, "{far} {counted}");
+    for frame in [110.0, 130.5] {
+        let (far, counted) = apart(frame);
+        assert!(far < 1e-6 && counted == 0.0, "{frame}: {far} {counted}");
+    }
+}
+
+#[test]
 fn each_gust_blows_to_a_side_of_its_own_by_its_influence() {
     // W5's sphere passes the CV at frame 48: influence 1 at its centre, ½ six frames before (smooth falloff at ½: ½).
     let gust = single(dot(5.0)).set(DISTANCE, 3.0);
