@@ -4,6 +4,7 @@
 //! proves nothing, because an interrupted part has a valid file of fewer frames: the reports say which frames it has, and
 //! every frame must be in exactly one part.
 
+mod notes;
 mod reports;
 
 use std::collections::BTreeMap;

@@ -1,4 +1,5 @@
-//! Pairs the files to compare: two files, two folders by file name, or two numbered sequences by frame.
+//! Pairs the files to compare: two files, two folders by file name (of another format if need be), or two numbered
+//! sequences by frame.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -35,7 +36,7 @@ pub(super) fn pairs(a: &Path, b: &Path) -> Result<Vec<Pair>, Failure> {
         (false, true) => return Err(not_a_pair(b, a, "a folder")),
         (true, true) => {}
     }
-    let pairs = joined(geometry_files(a)?, geometry_files(b)?);
+    let pairs = of_other_formats(joined(geometry_files(a)?, geometry_files(b)?));
     if pairs.is_empty() {
         let line = format!("neither `{}` nor `{}` has a geometry file", a.display(), b.display());
         return Err(Failure::new(Exit::CommandLine, line));
@@ -118,6 +119,27 @@ fn joined<K: Ord>(a: Vec<(K, PathBuf)>, b: Vec<(K, PathBuf)>) -> Vec<Pair> {
     pairs.into_values().collect()
 }
 
+/// Joins what is alone on its side with the file of the other side that has the same name in another format, if there is
+/// one only.
+fn of_other_formats(mut pairs: Vec<Pair>) -> Vec<Pair> {
+    let stem = |path: &Option<PathBuf>| path.as_ref().and_then(|path| path.file_stem()).map(ToOwned::to_owned);
+    let mut alone: BTreeMap<_, [Vec<usize>; 2]> = BTreeMap::new();
+    for (place, pair) in pairs.iter().enumerate() {
+        match (stem(&pair.a), stem(&pair.b)) {
+            (Some(stem), None) => alone.entry(stem).or_default()[0].push(place),
+            (None, Some(stem)) => alone.entry(stem).or_default()[1].push(place),
+            _ => {}
+        }
+    }
+    for sides in alone.into_values() {
+        if let [[a], [b]] = sides.each_ref().map(Vec::as_slice) {
+            pairs[*a].b = pairs[*b].b.take();
+        }
+    }
+    pairs.retain(|pair| pair.a.is_some() || pair.b.is_some());
+    pairs
+}
+
 /// The geometry files in a folder by name, without hidden ones, which are temporary.
 fn geometry_files(folder: &Path) -> Result<Vec<(String, PathBuf)>, Failure> {
     let unread = |error| Failure::file(FileError::new(folder, "read", error).to_string());
@@ -155,6 +177,23 @@ mod tests {
         let b = folder(&["fur.0002.json", "skin.0001.obj", "log.txt"]);
         let pairs = pairs(a.path(), b.path()).unwrap();
         let expected = [[Some("fur.0001.json"), None], [Some("fur.0002.json"); 2], [None, Some("skin.0001.obj")]];
+        assert_eq!(names(&pairs), expected);
+    }
+
+    #[test]
+    fn what_has_the_same_name_in_another_format_is_a_pair() {
+        let a = folder(&["fur.0001.json", "fur.0002.json", "skin.obj", "fur.0003.ply"]);
+        let b = folder(&["fur.0001.ply", "fur.0002.json", "skin.ply", "skin.json", "fur.0003.json"]);
+        let pairs = pairs(a.path(), b.path()).unwrap();
+        let expected = [
+            [Some("fur.0001.json"), Some("fur.0001.ply")],
+            [Some("fur.0002.json"); 2],
+            [Some("fur.0003.ply"), Some("fur.0003.json")],
+            // Either could be meant.
+            [None, Some("skin.json")],
+            [Some("skin.obj"), None],
+            [None, Some("skin.ply")],
+        ];
         assert_eq!(names(&pairs), expected);
     }
 

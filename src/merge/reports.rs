@@ -8,7 +8,7 @@ use engine::time::Frame;
 use formats::atomic::FileError;
 use serde_json::{Map, Value, json};
 
-use super::Piece;
+use super::{Piece, notes};
 use crate::failure::Failure;
 
 /// The report of a part.
@@ -157,6 +157,8 @@ pub(super) fn merged(reports: &[PartReport]) -> Value {
         frames.dedup();
     }
     all["parts"] = json!(reports.len());
+    all["notes"] = notes::joined(reports.iter().map(|part| &part.report), &all);
+    notes::sort_metrics(&mut all);
     let total = &all["total"];
     let rate = all["frames"].as_array().map_or(0, Vec::len) as f64 * 1e3
         / total["cooking_ms"].as_f64().unwrap_or(f64::INFINITY);

@@ -6,8 +6,9 @@ use engine::time::Frame;
 use numerics::ramp::Interpolation;
 use std::sync::Arc;
 
-use crate::builder::{TestGraph, engine, keyed, row};
+use crate::builder::{TestGraph, at, engine, keyed, row};
 use crate::nodes::{ADD, BOUNCE, CLOCK, FOLLOW, FROM_START, Probe, SOURCE, SUM};
+use crate::windows::follow;
 
 #[test]
 fn a_node_that_no_output_depends_on_is_never_called() {
@@ -156,6 +157,17 @@ fn stateless_graphs_cook_outside_the_scene_and_between_frames() {
     assert_eq!(cooked.xs(), [-3.0, 0.0, 2.5, 99.0]);
 }
 
+/// Rehearses and cooks the first output of a graph, and compares how often each node was called.
+fn assert_rehearsed(graph: &TestGraph, frames: &[Frame]) {
+    let engine = engine(2, 1 << 30);
+    let request = Request { outputs: vec![0], frames: frames.iter().copied().collect() };
+    let rehearsed = engine.rehearse(&graph.0, &request).unwrap_or_else(|error| panic!("{error}"));
+    let cooked = graph.cook_with(&engine, frames, None);
+    for (rehearsed, cooked) in rehearsed.nodes.iter().zip(&cooked.report.nodes) {
+        assert_eq!(rehearsed.cooks, cooked.cooks, "{:?} at {frames:?}", cooked.id);
+    }
+}
+
 #[test]
 fn a_rehearsal_counts_the_same_calls_as_a_cook() {
     let mut graph = TestGraph::new(1, 50);
@@ -168,12 +180,15 @@ fn a_rehearsal_counts_the_same_calls_as_a_cook() {
     let bounce = graph.add("bounce", &BOUNCE).wire("points", start).wire("floor", clock).done();
     graph.add("sum", &SUM).wire("points", again).wire("points", bounce).out();
     for frames in [(1..=50).collect(), vec![37], vec![20, 49], (-3..10).collect::<Vec<i64>>()] {
-        let engine = engine(2, 1 << 30);
-        let request = Request { outputs: vec![0], frames: frames.iter().copied().map(Frame::whole).collect() };
-        let rehearsed = engine.rehearse(&graph.0, &request).unwrap_or_else(|error| panic!("{error}"));
-        let cooked = graph.cook_in(&engine, frames.iter().copied());
-        for (rehearsed, cooked) in rehearsed.nodes.iter().zip(&cooked.report.nodes) {
-            assert_eq!(rehearsed.cooks, cooked.cooks, "{:?} at {frames:?}", cooked.id);
-        }
+        assert_rehearsed(&graph, &frames.into_iter().map(Frame::whole).collect::<Vec<Frame>>());
+    }
+}
+
+#[test]
+fn a_rehearsal_counts_the_calls_for_samples_between_frames() {
+    let graph = follow(50, 11);
+    let halves = |frames: std::ops::Range<i64>| frames.map(|half| at(half as f64 / 2.0)).collect::<Vec<Frame>>();
+    for frames in [halves(2..12), halves(41..60), vec![at(13.5)], [24.0, 24.75, 26.0].map(at).to_vec()] {
+        assert_rehearsed(&graph, &frames);
     }
 }

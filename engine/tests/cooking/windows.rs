@@ -12,7 +12,7 @@ use crate::nodes::{CLOCK, CORRECTED, DRIFT, FAIL, FOLLOW, Probe, SOURCE};
 type Positions = Weak<Vec<[f32; 3]>>;
 
 /// A window that reads a source with varying speed.
-fn follow(last: i64, frames: i64) -> TestGraph {
+pub(crate) fn follow(last: i64, frames: i64) -> TestGraph {
     let mut graph = TestGraph::new(1, last);
     let a = graph.add("a", &SOURCE).set("amount", 0.0_f32).set("count", 3_i64).done();
     let speed = [(0.0, 0.0), (7.0, 1.0), (15.0, -2.0), (31.0, 3.0), (50.0, 0.5)];

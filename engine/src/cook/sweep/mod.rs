@@ -245,9 +245,16 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         if !self.executor.delivers() {
             return MOST_FRAMES;
         }
-        // The first frame shows how much one takes.
+        // The first frame shows how much one takes. A sample between frames reads whole frames on both sides of it, which
+        // lie behind a chain that has been at the first frame.
         if self.frame_bytes == 0 && self.report.delivered.is_empty() {
-            return 1;
+            let frames = &self.plan.request.frames;
+            let second = frames.get(0).zip(frames.get(1));
+            return if second.is_some_and(|(first, second)| second.ticks() - first.ticks() < Frame::TICKS) {
+                2
+            } else {
+                1
+            };
         }
         let threads = rayon::current_num_threads();
         let bytes = self.frame_bytes.max(1);
