@@ -82,7 +82,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Deform",
-    2,
+    3,
     "Lets an existing groom follow guide curves, so that only a few hundred guides need to be simulated. Each curve \
      turns as the guides nearest to its root have turned since rest, and keeps its own shape, length and attributes. If \
      `skin` is wired, curves are kept out of it.",
@@ -124,21 +124,27 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     cx.publish(UNGUIDED, bound.unguided as f64);
     cx.publish(FAR_ROOTS, bound.far_roots as f64);
     let skin_rests = skins.is_none_or(|(rest, now)| rest.positions() == now.positions());
+    let moves = !skin_rests || guides.positions() != rest_guides.positions();
+    let keeps_out = skins.filter(|_| cx.get(KEEP_OUT));
     let (mut kept, mut length_error, mut off_skin) = (KeptOut::default(), 0.0, 0);
-    if !skin_rests || guides.positions() != rest_guides.positions() {
+    // What crosses the skin at rest is freed there too: else it would jump with the first move.
+    if moves || keeps_out.is_some() {
         let on_skin = match skins {
             Some((_, now)) => {
                 now.kept(SameBound(bound.clone()), || Ok(OnSkin::new(&bound, curves.element_count(), now, skin_rests)))?
             }
             None => Arc::new(OnSkin::without(&bound, curves, rest_guides, guides)),
         };
-        let deformed = deformed(cx, &bound, &on_skin, [rest_guides, guides])?;
+        let deformed = match moves {
+            true => deformed(cx, &bound, &on_skin, [rest_guides, guides])?,
+            false => DeformedCurves { points: curves.positions().to_vec(), ..DeformedCurves::default() },
+        };
         length_error = deformed.length_error;
         if let (Some(_), Some(poses)) = (skins, on_skin.guides()) {
             off_skin = roots_off(rest_guides, guides, poses);
         }
         let mut points = deformed.points;
-        if let Some((_, mesh)) = skins.filter(|_| cx.get(KEEP_OUT)) {
+        if let Some((_, mesh)) = keeps_out {
             let skin = skin(mesh);
             let how = KeepOut {
                 skin: skin.surface(),
@@ -149,7 +155,9 @@ fn cook(cx: &Cx) -> Result<Outputs> {
             };
             kept = keep_out(curves.runs().starts(), &mut points, &how);
         }
-        out.set(P, points)?;
+        if moves || kept.kept_out > 0 {
+            out.set(P, points)?;
+        }
         rotate_attributes(&mut out, on_skin.hairs(), &deformed.rotations);
     }
     cx.publish(OFF_SKIN, off_skin as f64);

@@ -110,6 +110,29 @@ fn rigid_motion_of_guides_and_skin_is_rigid() {
     }
 }
 
+/// Hairs that cross the skin at rest are freed at rest as they are in motion: none jumps with the first move.
+#[test]
+fn what_crosses_the_skin_at_rest_is_freed_there_too() {
+    let (mut curves, guides) = (field(14, 0.0), field(4, 0.2));
+    // Every other curve arches over into the floor.
+    let heights = [0.0, 0.02, 0.02, -0.01, -0.03];
+    for cvs in curves.edit(P).unwrap().chunks_mut(5).skip(1).step_by(2) {
+        let root = cvs[0];
+        (0..5).for_each(|k| cvs[k] = [root[0] + 0.02 * k as f32, root[1] + heights[k], root[2]]);
+    }
+    let rest = on_skin(curves.clone(), [guides.clone(), guides.clone()], [floor(), floor()]).cook();
+    let below = rest.curves().positions().iter().filter(|cv| cv[1] < -1e-6 && cv[0] < 1.0).count();
+    assert_eq!((below, rest.metrics["kept_out"]), (0, 98.0));
+    // The others keep their bits.
+    for (a, b) in rest.curves().positions().chunks(5).zip(curves.positions().chunks(5)).step_by(2) {
+        assert_eq!(a, b);
+    }
+    let now = moved(&guides, rigid);
+    let out = on_skin(curves, [guides, now], [floor(), moved(&floor(), rigid)]).cook();
+    let far = apart(&out, &moved(rest.curves(), rigid));
+    assert!(far < 1e-4, "{far}");
+}
+
 /// Guides that all turn by the same angle about their roots turn each hair about its own, on a skin that bends too.
 #[test]
 fn hairs_turn_as_guides_do() {

@@ -29,7 +29,7 @@ pub struct CurveDeform<'a> {
 
 /// Hairs that followed guides.
 #[must_use]
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct DeformedCurves {
     /// One point for each input point, metres.
     pub points: Vec<Vec3>,
