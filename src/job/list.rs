@@ -1,5 +1,5 @@
-//! A job as shell commands, one a line: those above the last may run in any order, the last merges. A line that starts with
-//! # says where another order costs time.
+//! A job as shell commands, one a line: those that cook may run in any order, those that merge come last, one for each wedge. A
+//! line that starts with # says where another order costs time.
 
 use super::{Job, Placeholders, quoted};
 

@@ -199,7 +199,7 @@ fn the_report_is_as_documented() {
     bench.done(&[&["cook", "g.json", "--format", "json", "--output", "grass", "--frames", "1-2"], &set[..]].concat());
     let report = bench.read_json("report.json");
     let keys = |value: &serde_json::Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
-    assert_eq!(keys(&report), ["frames", "graph", "nodes", "notes", "outputs", "recipe", "report", "total"]);
+    assert_eq!(keys(&report), ["report", "graph", "recipe", "frames", "nodes", "outputs", "notes", "total"]);
     assert_eq!((&report["report"], &report["frames"]), (&json!(1), &json!([1, 2])));
     let wind = &report["nodes"]["wind"];
     let documented = ["type", "time", "cooks", "from_cache", "left_out", "wall_ms", "cpu_ms", "peak_bytes", "metrics"];
@@ -213,6 +213,10 @@ fn the_report_is_as_documented() {
     let bytes: u64 = bench.files("out").values().map(|file| file.len() as u64).sum();
     assert_eq!(grass["bytes"], json!(bytes));
     assert_eq!(bench.names("out"), ["grass.0001.json", "grass.0002.json"]);
+    // Frame 10 comes after frame 2.
+    bench.done(&[&["cook", "g.json", "--no-write", "--output", "grass", "--frames", "1-11"], &set[..]].concat());
+    let angles = &bench.read_json("report.json")["nodes"]["wind"]["metrics"]["max_angle"];
+    assert_eq!(keys(angles), (1..=11).map(|frame| frame.to_string()).collect::<Vec<_>>());
 }
 
 /// A tool that reads a metric at a frame finds it at every frame: under the frame, or under `still`.

@@ -223,6 +223,38 @@ fn a_merge_demands_every_frame_once() {
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(2), "no part has an output `fur`; outputs: `grass`, `still`\n"));
 }
 
+/// Notes once a kind and node, with the frames of all parts and the worst value; metrics frame by frame, to the last digit.
+#[test]
+fn the_report_of_a_merge_is_that_of_the_whole() {
+    let bench = Bench::with_graph(
+        r#"{"convect": 1, "scene": {"frames": [1, 12]}, "nodes": {
+            "blade": {"type": "Curve_In", "params": {"points": [[0, 0, 0], [0, 0.3, 0.1]]}},
+            "gusts": {"type": "Curve_Wind_Gusts", "inputs": {"curves": "blade"}, "params": {
+                "loop": 8, "start_frame_range": [1, 8], "life_range": [9, 9],
+                "wind_dir": {"keyframes": [[1, [1, 0, 0]], [12, [0, 0, 1]]]}}},
+            "wind": {"type": "Curve_Wind", "inputs": {"curves": "gusts"}}}, "outputs": {"grass": "wind"}}"#,
+    );
+    bench.done(&["cook", "g.json", "--out", "whole", "--report", "whole.json"]);
+    for part in ["1-5", "6-12"] {
+        let folder = format!("farm/parts/{part}");
+        bench.done(&["cook", "g.json", "--part", part, "--out", &folder, "--report", &format!("{folder}/report.json")]);
+    }
+    bench.done(&["merge", "farm"]);
+    let [whole, merged] = ["whole.json", "farm/report.json"].map(|report| bench.read_json(report));
+    let kinds: Vec<&Value> = whole["notes"].as_array().unwrap().iter().map(|note| &note["kind"]).collect();
+    assert!(kinds.contains(&&json!("unlooped_gusts")) && kinds.contains(&&json!("no_width")), "{kinds:?}");
+    let sorted = |report: &Value| {
+        let mut notes: Vec<String> = report["notes"].as_array().unwrap().iter().map(Value::to_string).collect();
+        notes.sort();
+        notes
+    };
+    assert_eq!(sorted(&whole), sorted(&merged));
+    for node in ["gusts", "wind"] {
+        let [a, b] = [&whole, &merged].map(|report| report["nodes"][node]["metrics"].to_string());
+        assert_eq!(a, b, "in order, too");
+    }
+}
+
 #[test]
 fn files_of_frames_merge_too() {
     let bench = Bench::new();
