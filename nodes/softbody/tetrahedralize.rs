@@ -89,7 +89,8 @@ metrics! { METRICS:
     QUALITY_MEDIAN = Metric::new("quality_median", Unit::None,
         "Median quality of the tets: three times the inradius ÷ the circumradius. 1 is a regular tet, 0 a flat one.");
     VOLUME_ERROR = Metric::new("volume_error", Unit::None,
-        "Difference between the volume of the tets and that enclosed by the surface, relative to the latter.")
+        "Difference between the volume of the tets and that enclosed by the surface, relative to the latter. 0 for a \
+         cage of a surface that is open or crosses itself, where it is not measured.")
         .warn_above(0.01, "The tets cut corners of the surface or bulge beyond it, so the body has another shape than its \
             surface. Use smaller and more even faces where the surface is thin or has long faces, or a smaller \
             `spacing`.");
