@@ -23,6 +23,7 @@ mod goals;
 mod joints;
 mod measured;
 mod obstacles;
+mod pace;
 mod pins;
 mod run;
 mod setup;
@@ -71,7 +72,7 @@ params! { PARAMS:
     START_FRAME: Param<i64> = Param::int("start_frame", 1,
         "The frame at which the simulation starts from `bodies`.").unit(Unit::Frame).default_scene_start().fixed();
     GRAVITY: Param<[f32; 3]> = Param::vec3("gravity", [0.0, -9.81, 0.0], "Acceleration due to gravity.")
-        .unit(Unit::MetresPerSecondSquared);
+        .unit(Unit::MetresPerSecondSquared).history();
     DENSITY: Param<Maskable> = Param::maskable("density", 1000.0,
         "Mass per volume. At the same stiffness, denser bodies sag more.")
         .unit(Unit::KilogramsPerCubicMetre).above(0.0).soft(100.0, 3000.0);
@@ -87,7 +88,7 @@ params! { PARAMS:
         .unit(Unit::Seconds).at_least(0.0).soft(0.0, 0.1);
     DRAG: Param<f32> = Param::float("drag", 0.0,
         "Rate at which all motion is slowed, as by thick air: at 1 a body loses 63 % of its speed in a second.")
-        .unit(Unit::PerSecond).at_least(0.0).soft(0.0, 5.0);
+        .unit(Unit::PerSecond).at_least(0.0).soft(0.0, 5.0).history();
     VOLUME: Param<f32> = Param::float("volume", 1.0,
         "Strength of volume preservation and of the resistance to tets turning inside out: at 1 volume stays nearly \
          constant, at 0 there are only springs, and soft bodies crumple.")
@@ -153,7 +154,7 @@ params! { PARAMS:
         .unit(Unit::MetresPerSecond).fixed();
     TIME_SCALE: Param<f32> = Param::float("time_scale", 1.0,
         "Simulated seconds per second of the scene: 0.5 is slow motion, 0 stops time.")
-        .at_least(0.0).soft(0.0, 2.0);
+        .at_least(0.0).soft(0.0, 2.0).history();
 }
 
 const SURFACE: Output = Output::new(
@@ -289,6 +290,16 @@ metrics! { METRICS:
         "Points of the mesh that rides along that are outside the tets by more than the size of a tet.")
         .warn_above(0.0, "The mesh that rides along reaches far out of the tets, which stretch it there beyond what the body \
             does. Give `carry` of Tetrahedralize a mesh that lies within its surface, or the surface the shape of that mesh.");
+    STIFFEST_DIRECTION = Metric::new("stiffest_direction", Unit::None,
+        "Resistance of the springs to even stretching in the direction in which they resist most, relative to `stiffness`; of \
+         the body for which that is largest. About 1 for tets that are as wide as long; long tets are stiffer along their \
+         length. 0 if no body has a volume.")
+        .warn_above(1.7, "{bodies:stiffest_direction_wire} has long tets, which make it stiffer along their length than \
+            `stiffness` says, about as many times as `stiffest_direction`. Give its surface faces that are as long as wide, use \
+            `method` `cage` of Tetrahedralize, or lower `stiffness`.");
+    STIFFEST_DIRECTION_WIRE = Metric::new("stiffest_direction_wire", Unit::None, "The wire of that body, from 0; −1 if there is none.");
+    SOFTEST_DIRECTION = Metric::new("softest_direction", Unit::None,
+        "The same in the direction in which they resist least, of the body for which that is smallest.");
     PINNED = Metric::new("pinned", Unit::None,
         "Particles held or pulled by pins. If it is 0, no particle was within a pin's `radius` at the start.");
     TORN = Metric::new("torn", Unit::None, "Coupling springs torn since the start.");
@@ -297,11 +308,11 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
-    10,
+    11,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
      other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
-     pins hold them. `stiffness` has the same effect at any mesh resolution, and the solver is stable for any \
-     stiffness, mass and initial state.",
+     pins hold them. `stiffness` has the same effect at any mesh resolution as long as tets are about as wide as long \
+     (`stiffest_direction`), and the solver is stable for any stiffness, mass and initial state.",
     Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),
 )
 .inputs(INPUTS)
@@ -329,7 +340,9 @@ pub(crate) static NODE: Node = Node::new(
 ])
 .writes(&[&P, &BODY_NUMBER])
 .metrics(METRICS)
-.leaves_out(leaves_out);
+.leaves_out(leaves_out)
+.integrates(|params| params.get(GRAVITY).map(f64::from))
+.integrates(|params| [params.get(DRAG), params.get(TIME_SCALE), 0.0].map(f64::from));
 
 fn couples(params: &Params) -> bool {
     params.get(COUPLING_RADIUS) > 0.0

@@ -13,15 +13,16 @@ use serde::{Deserialize, Serialize};
 
 use super::goals::{GoalHistory, Goals};
 use super::measured::measured;
+use super::pace::Pace;
 use super::setup::{MaterialFields, ParticleNumber, SimulationSetup, StartInputs, refusal};
 use super::{
     BODY_COLLISION, BOUNCE, CARRIED_OUTSIDE, COLLIDERS, COUPLING_BREAK, DEEPEST_OVERLAP, DEEPEST_PENETRATION, DRAG,
     FRICTION, GOAL_DISTANCE, GOAL_ON, GOALS, GRAVITY, GROUND, GROUND_HEIGHT, IDLE_PINS, IDLE_PINS_POINT,
     IDLE_PINS_WIRE, INITIAL_VELOCITY, INTEGRATOR, KEEP_DENTS, LET_GO, LOST_SHARE, NOT_PUSHED_OUT, PINNED, PINS,
     PLASTIC_CREEP, PLASTIC_WORK, PLASTIC_YIELD, POINTS_INSIDE, RESET_ENERGY, RESET_FRAMES, RESET_TO_GOALS,
-    SELF_COLLISION, SEPARATION_FRAMES, START_FRAME, STARTED_IN_BODIES, STARTED_IN_BODIES_OTHER, STARTED_IN_BODIES_WIRE,
-    STARTED_IN_COLLIDERS, STARTED_INSIDE, STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS,
-    TIME_SCALE, TOLERANCE, VOLUME,
+    SELF_COLLISION, SEPARATION_FRAMES, SOFTEST_DIRECTION, START_FRAME, STARTED_IN_BODIES, STARTED_IN_BODIES_OTHER,
+    STARTED_IN_BODIES_WIRE, STARTED_IN_COLLIDERS, STARTED_INSIDE, STIFFEST_DIRECTION, STIFFEST_DIRECTION_WIRE,
+    STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS, TOLERANCE, VOLUME,
 };
 use super::{obstacles, pins};
 
@@ -54,9 +55,10 @@ struct Solving {
 
 /// A step between two frames, or the start, which takes no time.
 #[derive(Clone, Copy)]
-struct Interval {
+struct Interval<'a> {
     frames: [f64; 2],
     seconds: f64,
+    pace: &'a Pace<'a>,
 }
 
 /// What acts on bodies in a step, besides contacts.
@@ -86,13 +88,15 @@ impl Chain for Run {
             setup: OnceLock::from(Arc::new(setup)),
             solving: Some(solving),
         };
-        run.advance(cx, Interval { frames: [cx.frame().number(); 2], seconds: 0.0 })?;
+        let frames = [cx.frame().number(); 2];
+        run.advance(cx, Interval { frames, seconds: 0.0, pace: &Pace::new(cx, frames) })?;
         Ok(run)
     }
 
     fn step(&mut self, cx: &StepCx) -> Result<()> {
         let frames = [cx.previous(), cx.frame()].map(Frame::number);
-        self.advance(cx, Interval { frames, seconds: cx.dt() * f64::from(cx.get(TIME_SCALE)) })
+        let pace = Pace::new(cx, frames);
+        self.advance(cx, Interval { frames, seconds: pace.seconds(cx), pace: &pace })
     }
 
     fn output(&self, cx: &FrameCx) -> Result<Outputs> {
@@ -116,7 +120,7 @@ const NEAR: f64 = 1e-6;
 
 impl Run {
     /// Moves bodies through an interval and sets the metrics; at the start only these.
-    fn advance(&mut self, cx: &FrameCx, interval: Interval) -> Result<()> {
+    fn advance(&mut self, cx: &FrameCx, interval: Interval<'_>) -> Result<()> {
         let setup = self.setup(cx)?;
         let material = MaterialFields::at(cx, &self.inputs)?;
         let mut solving = match self.solving.take() {
@@ -135,6 +139,7 @@ impl Run {
             self.metrics.set(STARTED_INSIDE, inside as f64);
             set_overlaps(&setup, &overlaps, &mut self.metrics);
             self.metrics.set(CARRIED_OUTSIDE, setup.carried_outside() as f64);
+            set_evenness(&setup, &solving.body, &mut self.metrics);
             self.overlaps = overlaps;
         }
         let mut overlaps = std::mem::take(&mut self.overlaps);
@@ -181,7 +186,7 @@ impl Run {
         cx: &'a FrameCx<'_>,
         setup: &'a SimulationSetup,
         history: &'a mut GoalHistory,
-        interval: Interval,
+        interval: Interval<'_>,
     ) -> Result<Influences<'a>> {
         let wired = cx.part(GOALS);
         let mut goals = Goals::of(&self.inputs, setup, &wired, cx.get(START_FRAME) as f64, history)?;
@@ -206,7 +211,7 @@ impl Run {
         solving: &mut Solving,
         influences: &Influences<'_>,
         scene: &CollisionScene<'_>,
-        interval: Interval,
+        interval: Interval<'_>,
     ) -> Result<FrameReport> {
         let touches = scene.ground.is_some()
             || !scene.obstacles.is_empty()
@@ -214,10 +219,12 @@ impl Run {
             || scene.self_contact.is_some();
         let (whole, frames) = (f64::from(cx.get(RESET_TO_GOALS)), cx.get(RESET_FRAMES) as f64);
         let pushed = scene.separation.is_some_and(|apart| !apart.overlaps.is_empty() && apart.over < apart.frames);
+        let ambient = |time: f64| interval.pace.ambient(time);
         let frame = SolverFrame {
             seconds: interval.seconds,
             gravity: cx.get(GRAVITY).map(f64::from),
             drag: f64::from(cx.get(DRAG)),
+            during: if interval.pace.varies { Some(&ambient) } else { None },
             volume: f64::from(cx.get(VOLUME)),
             goals: &influences.pulled,
             pins: &influences.held,
@@ -249,7 +256,7 @@ impl Run {
         setup: &SimulationSetup,
         body: &SoftBody,
         goals: &Goals<'_>,
-        interval: Interval,
+        interval: Interval<'_>,
     ) {
         let now = interval.frames[1];
         let plasticity =
@@ -300,14 +307,28 @@ impl Run {
 }
 
 /// Metrics of the start that later frames publish, too.
-const AT_START: [Metric; 6] = [
+const AT_START: [Metric; 9] = [
     STARTED_INSIDE,
     STARTED_IN_BODIES,
     STARTED_IN_BODIES_WIRE,
     STARTED_IN_BODIES_OTHER,
     STARTED_IN_COLLIDERS,
     CARRIED_OUTSIDE,
+    STIFFEST_DIRECTION,
+    STIFFEST_DIRECTION_WIRE,
+    SOFTEST_DIRECTION,
 ];
+
+/// Sets the metrics of how evenly bodies resist in all directions.
+fn set_evenness(setup: &SimulationSetup, body: &SoftBody, metrics: &mut MetricValues) {
+    let moduli = body.directional_moduli();
+    let stiffest = moduli.iter().rev().max_by(|a, b| a.range[1].total_cmp(&b.range[1]));
+    let wire = stiffest.and_then(|stiffest| setup.wire_of_particle(stiffest.particle as usize));
+    let softest = moduli.iter().map(|modulus| modulus.range[0]).reduce(f64::min);
+    metrics.set(STIFFEST_DIRECTION, stiffest.map_or(0.0, |stiffest| stiffest.range[1]));
+    metrics.set(STIFFEST_DIRECTION_WIRE, wire.map_or(-1.0, |wire| wire as f64));
+    metrics.set(SOFTEST_DIRECTION, softest.unwrap_or(0.0));
+}
 
 /// Sets the metrics of what is inside something at the start.
 fn set_overlaps(setup: &SimulationSetup, overlaps: &[Overlap], metrics: &mut MetricValues) {
