@@ -181,13 +181,15 @@ metrics! { METRICS:
     VOLUME_NOW = Metric::new("volume", Unit::CubicMetres, "Volume that the surface encloses, without the parts inside \
         colliders.");
     VOLUME_DRIFT_RAW = Metric::new("volume_drift_raw", Unit::None,
-        "Relative error that the volume would have if it had never been corrected.");
+        "Relative error that the volume would have if it had never been corrected.")
+        .warn_last_outside(-0.03, 0.03, "This share of the liquid's volume was lost (below 0) or gained (above 0) up to this frame because \
+            cells and substeps are too coarse. `volume_correction` has made good {volume_made_good} % of the volume, {made_good_now} % \
+            in the frame alone: the volume as a whole is right, but some parts of the liquid are too thick and others too thin. Films, \
+            drops, sheets and jets of less than two cells are lost, and what overlaps where surfaces meet or liquid hits something. Use a \
+            smaller `cell`; in frames in which liquid hits something a smaller `cfl` helps, too. Neither does in a splash, which only \
+            becomes finer.");
     MADE_GOOD = Metric::new("volume_made_good", Unit::Percent,
-        "Volume that correction has added or removed since the start, in percent of the volume.")
-        .warn_last_above(10.0, "`volume_correction` has made good {volume_made_good} % of the liquid's volume by this frame, {made_good_now} \
-            % in the frame alone. The volume as a whole is right, but some parts of the liquid are too thick and others too thin. What is \
-            lost are drops, sheets and jets of less than two cells, and what overlaps where surfaces meet; a smaller `cell` helps \
-            where liquid stays smooth, not in a splash, which only becomes finer with it.");
+        "Volume that correction has added or removed since the start, in percent of the volume.");
     MADE_GOOD_NOW = Metric::new("made_good_now", Unit::Percent,
         "Volume that correction added or removed in the frame, in percent of the volume.");
     VOLUME_DRIFT = Metric::new("volume_drift", Unit::None, "Relative error of the volume that remains after correction.")

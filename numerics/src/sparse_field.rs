@@ -291,11 +291,15 @@ impl SparseField {
         if stored.iter().all(|is_stored| *is_stored) {
             return;
         }
-        let kept = |is_stored: &bool| *is_stored;
-        let keys = self.keys.iter().zip(&stored).filter(|(_, is_stored)| kept(is_stored)).map(|(key, _)| *key);
-        let blocks = self.values.as_chunks::<BLOCK_NODES>().0.iter().zip(&stored);
-        let values = blocks.filter(|(_, is_stored)| kept(is_stored)).flat_map(|(block, _)| block).copied();
-        (self.keys, self.values) = (Arc::new(keys.collect()), Arc::new(values.collect()));
+        // Of known length, so that no room for more is kept with them.
+        let count = stored.iter().filter(|is_stored| **is_stored).count();
+        let (mut keys, mut values) = (Vec::with_capacity(count), Vec::with_capacity(count * BLOCK_NODES));
+        let all = self.keys.iter().zip(self.values.as_chunks::<BLOCK_NODES>().0).zip(&stored);
+        for ((key, block), _) in all.filter(|(_, is_stored)| **is_stored) {
+            keys.push(*key);
+            values.extend_from_slice(block);
+        }
+        (self.keys, self.values) = (Arc::new(keys), Arc::new(values));
     }
 }
 

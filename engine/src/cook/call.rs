@@ -22,6 +22,7 @@ pub(crate) struct Call<'a> {
     pub(crate) inputs: Vec<(&'static str, InputData)>,
     pub(crate) live: Option<&'a [Name]>,
     pub(crate) if_there: &'a [Name],
+    pub(crate) outputs_used: &'a [bool],
     pub(crate) cancel: &'a AtomicBool,
     pub(crate) clock: Clock,
     pub(crate) origin: [f64; 3],
@@ -71,6 +72,7 @@ impl<'a> Call<'a> {
                 inputs: self.inputs,
                 live: self.live,
                 if_there: self.if_there,
+                outputs_used: self.outputs_used,
                 cancel: self.cancel,
                 ceiling: self.ceiling,
                 held: self.held,
@@ -112,7 +114,11 @@ impl Finished<'_> {
         let mut new_bytes = 0;
         let mut stripped = Vec::new();
         let mut cooked = Vec::with_capacity(node.outputs.len());
-        for declared in node.outputs {
+        for (port, declared) in node.outputs.iter().enumerate() {
+            if !self.cx.uses_output(port) {
+                cooked.push(Arc::default());
+                continue;
+            }
             let found = outputs.0.iter().find(|(name, _)| *name == declared.name);
             let (_, geometry) = found.ok_or_else(|| Error::contract(format!("it returns no `{}`", declared.name)))?;
             if let Carries::Kinds(kinds) = declared.carries

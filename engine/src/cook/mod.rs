@@ -133,6 +133,7 @@ impl Engine {
         sink: &mut Sink<'_, E>,
     ) -> Result<Report, Stopped<E>> {
         let plan = self.plan(graph, request).map_err(Stopped::Asked)?;
+        let plan = if disk.is_some() { plan.keeping_all_outputs() } else { plan };
         self.pool.install(|| Sweep::new(self, &plan, Executor::Cook, disk, cancel).run(sink))
     }
 
@@ -148,7 +149,7 @@ impl Engine {
         disk: &mut DiskCache,
         cancel: &AtomicBool,
     ) -> Result<Report, Arc<CookError>> {
-        let plan = self.plan(graph, request)?;
+        let plan = self.plan(graph, request)?.keeping_all_outputs();
         let mut nothing = |_: &[Delivered]| -> Result<(), std::convert::Infallible> { Ok(()) };
         let sweep = || Sweep::new(self, &plan, Executor::Cook, Some(disk), cancel).until(nodes).run(&mut nothing);
         match self.pool.install(sweep) {

@@ -23,7 +23,7 @@ pub(super) fn notes(
         let values = published.get(metric.name)?;
         let excess = |value: &f64| warning.when.excess(*value);
         let judged = match warning.when {
-            Trouble::LastAbove(_) => values.len().saturating_sub(1),
+            Trouble::LastAbove(_) | Trouble::LastOutside(..) => values.len().saturating_sub(1),
             _ => 0,
         };
         let over: Vec<(&Frame, &f64)> = values.iter().skip(judged).filter(|(_, value)| excess(value) > 0.0).collect();
@@ -87,6 +87,7 @@ mod tests {
     const FREE: Metric = Metric::new("free", Unit::None, "Unlimited.");
     const RATIO: Metric = Metric::new("ratio", Unit::None, "Ratio.").warn_outside(0.9, 1.1, "Keep it.");
     const MISSED: Metric = Metric::new("missed", Unit::None, "So far.").warn_last_above(1.0, "Come nearer.");
+    const ENDS: Metric = Metric::new("ends", Unit::None, "So far.").warn_last_outside(-1.0, 1.0, "Return.");
     const FAR: Metric = Metric::new("far", Unit::None, "Distance.").warn_always_above(1.0, "Come near.");
 
     const IDLE: Metric =
@@ -109,7 +110,7 @@ mod tests {
             values.iter().enumerate().map(|(frame, value)| (Frame::whole(frame as i64), *value)).collect();
         let published = BTreeMap::from([(name, frames)]);
         let notes =
-            notes(&"fur".into(), "Curve_Wind", &[&DEEP, &FREE, &RATIO, &FAR, &MISSED], &published, &|_, _| None);
+            notes(&"fur".into(), "Curve_Wind", &[&DEEP, &FREE, &RATIO, &FAR, &MISSED, &ENDS], &published, &|_, _| None);
         notes.iter().map(Note::to_string).collect()
     }
 
@@ -135,5 +136,7 @@ mod tests {
         assert_eq!(shown("far", &[2.0, 3.0]), ["`fur` (Curve_Wind): `far` is 3 at frame 1 (frames 0-1). Come near."]);
         assert_eq!(shown("missed", &[3.0, 0.5]), Vec::<String>::new());
         assert_eq!(shown("missed", &[0.5, 2.0]), ["`fur` (Curve_Wind): `missed` is 2 at frame 1. Come nearer."]);
+        assert_eq!(shown("ends", &[-3.0, 0.5]), Vec::<String>::new());
+        assert_eq!(shown("ends", &[0.5, -2.0]), ["`fur` (Curve_Wind): `ends` is -2 at frame 1. Return."]);
     }
 }

@@ -45,6 +45,8 @@ pub struct Cx<'a> {
     pub(crate) live: Option<&'a [Name]>,
     /// Those of `live` that need not be there.
     pub(crate) if_there: &'a [Name],
+    /// Which of its outputs are used; empty: all.
+    pub(crate) outputs_used: &'a [bool],
     pub(crate) cancel: &'a AtomicBool,
     pub(crate) ceiling: Ceiling,
     /// Bytes of the results that a frame holds already.
@@ -106,6 +108,18 @@ impl Cx<'_> {
     /// As [`Cx::wants`], for an attribute given by name.
     pub fn wants_named(&self, attribute: &str) -> bool {
         self.live.is_none_or(|live| live.iter().any(|name| **name == *attribute))
+    }
+
+    /// Whether anything downstream, or an output of the graph, takes that output of this node. A solver or window may return
+    /// its outputs without one that nobody takes.
+    pub fn wants_output(&self, output: Output) -> bool {
+        let port = self.node.outputs.iter().position(|declared| declared.name == output.name);
+        port.is_none_or(|port| self.uses_output(port))
+    }
+
+    /// The same by the output's number.
+    pub(crate) fn uses_output(&self, port: usize) -> bool {
+        self.outputs_used.get(port).is_none_or(|is_used| *is_used)
     }
 
     /// Publishes a metric at this frame. A value that is not finite is left out of the report, with a note.

@@ -46,6 +46,8 @@ pub enum Trouble {
     AlwaysAbove(f64),
     /// Values above this at the last frame that has one.
     LastAbove(f64),
+    /// A value that is not between these two, both included, at the last frame that has one.
+    LastOutside(f64, f64),
 }
 
 impl Trouble {
@@ -54,7 +56,7 @@ impl Trouble {
     pub fn excess(self, value: f64) -> f64 {
         match self {
             Self::Above(limit) | Self::AlwaysAbove(limit) | Self::LastAbove(limit) => value - limit,
-            Self::Outside(low, high) => f64::max(low - value, value - high),
+            Self::Outside(low, high) | Self::LastOutside(low, high) => f64::max(low - value, value - high),
         }
     }
 }
@@ -113,6 +115,12 @@ impl Metric {
     #[must_use]
     pub const fn warn_last_above(self, above: f64, text: &'static str) -> Self {
         self.warn(Trouble::LastAbove(above), text)
+    }
+
+    /// The cook's notes say `text` when the metric is not in `low..=high` at the last frame.
+    #[must_use]
+    pub const fn warn_last_outside(self, low: f64, high: f64, text: &'static str) -> Self {
+        self.warn(Trouble::LastOutside(low, high), text)
     }
 
     const fn warn(mut self, when: Trouble, text: &'static str) -> Self {

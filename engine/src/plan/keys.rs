@@ -186,13 +186,14 @@ impl<'p, 'g> Keys<'p, 'g> {
         Ok(Ok(self.finish_with_live(node)))
     }
 
-    /// Completes a key by the attributes that are used of the node's result.
+    /// Completes a key by the attributes and outputs that are used of the node's result.
     fn finish_with_live(&mut self, node: usize) -> ContentKey {
-        let PlannedNode { live, if_there, .. } = &self.plan.nodes[node];
+        let PlannedNode { live, if_there, outputs_used, .. } = &self.plan.nodes[node];
         let names = live.as_deref().unwrap_or_default();
         let hasher = self.hasher.tag(u8::from(live.is_some())).i64(names.len() as i64);
         let hasher = names.iter().fold(hasher, |hasher, name| hasher.text(name)).i64(if_there.len() as i64);
-        if_there.iter().fold(hasher, |hasher, name| hasher.text(name)).finish()
+        let hasher = if_there.iter().fold(hasher, |hasher, name| hasher.text(name));
+        outputs_used.iter().fold(hasher, |hasher, is_used| hasher.i64(i64::from(*is_used))).finish()
     }
 
     /// Keys of all results that are read, or those that are missing.

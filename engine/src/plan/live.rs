@@ -1,4 +1,4 @@
-//! Attribute liveness: which attributes of each node's result anything downstream, or a file, takes.
+//! Liveness: which attributes of each node's result, and which outputs of a chain, anything downstream, or a file, takes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,7 +11,7 @@ use crate::param::{Source, Value};
 /// What is taken of a result, and whether it must be there: see [`crate::node::Node::reads_if_there`]. `None` is everything.
 type Taken = Option<BTreeMap<Name, bool>>;
 
-/// Fills in `live` of every planned node, from the outputs upwards.
+/// Fills in `live` and `outputs_used` of every planned node, from the outputs upwards.
 pub(super) fn find(graph: &Graph, request: &Request, nodes: &mut [PlannedNode<'_>]) {
     let mut taken: Vec<Taken> = vec![Some(BTreeMap::new()); graph.nodes.len()];
     for output in request.outputs.iter().map(|place| &graph.outputs[*place]) {
@@ -32,6 +32,27 @@ pub(super) fn find(graph: &Graph, request: &Request, nodes: &mut [PlannedNode<'_
             add(&mut taken[link.node], wanted.clone());
         }
     }
+    find_outputs(graph, request, nodes);
+}
+
+/// Finds which outputs of solvers and windows are used. Other nodes keep all of theirs: sources are cooked by the check of
+/// a graph as well, which uses all.
+fn find_outputs(graph: &Graph, request: &Request, nodes: &mut [PlannedNode<'_>]) {
+    for (planned, node) in nodes.iter_mut().zip(&graph.nodes) {
+        if let Some(declared) = node.node().filter(|declared| planned.needed && declared.cook.is_chain()) {
+            planned.outputs_used = vec![false; declared.outputs.len()];
+        }
+    }
+    let of_readers = (0..nodes.len()).filter(|place| nodes[*place].needed);
+    let links = of_readers.flat_map(|place| graph.nodes[place].inputs().iter().flatten());
+    let asked = request.outputs.iter().map(|place| &graph.outputs[*place].from);
+    for link in links.chain(asked).copied().collect::<Vec<_>>() {
+        if let Some(is_used) = nodes[link.node].outputs_used.get_mut(link.port) {
+            *is_used = true;
+        }
+    }
+    // Where all are used, the key is that of a cook of all.
+    nodes.iter_mut().filter(|node| !node.outputs_used.contains(&false)).for_each(|node| node.outputs_used.clear());
 }
 
 fn add(taken: &mut Taken, more: Taken) {

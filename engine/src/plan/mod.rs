@@ -71,6 +71,8 @@ pub(crate) struct PlannedNode<'g> {
     pub(crate) live: Option<Vec<Name>>,
     /// Those of them that need not be there: all who read them take a missing one for neutral.
     pub(crate) if_there: Vec<Name>,
+    /// Which of its outputs are used; a solver or window keeps no others. Empty: all.
+    pub(crate) outputs_used: Vec<bool>,
     /// Whether a window or solver depends on it, which asks for every frame in turn.
     pub(crate) feeds_chain: bool,
     pub(crate) resolver: Resolver<'g>,
@@ -117,6 +119,13 @@ impl<'g> Plan<'g> {
         let plan = Self { graph, request, nodes, dag, files, number: PLANS.fetch_add(1, Ordering::Relaxed) };
         plan.check_sub_frames()?;
         Ok(plan)
+    }
+
+    /// The same plan, with all outputs of every node kept: results on disk are for cooks of other outputs, too.
+    #[must_use]
+    pub(crate) fn keeping_all_outputs(mut self) -> Self {
+        self.nodes.iter_mut().for_each(|node| node.outputs_used.clear());
+        self
     }
 
     fn check_sub_frames(&self) -> Result<(), Arc<CookError>> {
@@ -205,6 +214,7 @@ impl<'g> PlannedNode<'g> {
             read_at_start: false,
             live: None,
             if_there: Vec::new(),
+            outputs_used: Vec::new(),
             feeds_chain: false,
             resolver: Resolver::lazy(node, graph, files),
         }
@@ -255,6 +265,7 @@ fn plan_node<'g>(
         read_at_start: false,
         live: None,
         if_there: Vec::new(),
+        outputs_used: Vec::new(),
         feeds_chain: false,
     }
 }

@@ -20,7 +20,7 @@ pub fn result_keys(graph: &Graph, node: &str, frames: &[Frame]) -> Result<Vec<Co
     let index = graph.nodes.iter().position(|known| &*known.id == node);
     let index = index.unwrap_or_else(|| panic!("the graph has no node `{node}`"));
     let request = Request { outputs: (0..graph.outputs.len()).collect(), frames: frames.to_vec().into() };
-    let plan = Plan::new(graph, &request, Arc::default())?;
+    let plan = Plan::new(graph, &request, Arc::default())?.keeping_all_outputs();
     let cancel = AtomicBool::new(false);
     let mut keys = Keys::new(&plan, &cancel);
     frames.iter().map(|frame| keys.resolve(index, plan.canonical(index, *frame)).map(|resolved| resolved.key)).collect()

@@ -1,8 +1,12 @@
 //! Memory: what is kept and dropped, and results that do not depend on threads or memory.
 
-use engine::geometry::{Geometry, Kind, Owner};
-use engine::inputs;
-use engine::node::{Cook, Input, Node, Output};
+use engine::cook::DiskCache;
+use engine::geometry::{Component, Geometry, Kind, Owner};
+use engine::graph::Link;
+use engine::node::{Chain, Cook, FrameCx, Input, Metric, Node, Output, Outputs, StepCx};
+use engine::time::Frame;
+use engine::{Result, inputs, metrics};
+use serde::{Deserialize, Serialize};
 
 use crate::builder::{Cooked, TestGraph, engine};
 use crate::nodes::{ADD, BOUNCE, CLOCK, DUST, DUSTY, FOLLOW, SOURCE, SUM, UNSURE_NODE};
@@ -32,6 +36,69 @@ fn an_attribute_that_nothing_reads_is_dropped() {
     assert_eq!(none.node("dusty").metrics["wanted"].values().next(), Some(&0.0));
     let other = dusty(Some(vec!["colour".into()]));
     assert!(!has_dust(other.geometry(1.0)));
+}
+
+const FEW: Output = Output::new("few", &[Kind::Points], "A point.");
+const MANY: Output = Output::new("many", &[Kind::Points], "Many points.");
+
+metrics! { TWO_METRICS:
+    MANY_WANTED = Metric::new("many_wanted", engine::param::Unit::None, "1 where `many` is made.");
+}
+
+/// Points of `many`.
+const COUNT: usize = 10_000;
+
+/// A solver with two outputs, of which it makes `many` only where that is wanted.
+#[derive(Serialize, Deserialize)]
+struct Two(f32);
+
+impl Chain for Two {
+    fn start(cx: &FrameCx) -> Result<Self> {
+        Ok(Self(cx.frame().number() as f32))
+    }
+
+    fn step(&mut self, _: &StepCx) -> Result<()> {
+        self.0 += 1.0;
+        Ok(())
+    }
+
+    fn output(&self, cx: &FrameCx) -> Result<Outputs> {
+        let points = |count: usize| Geometry::from(Component::points(vec![[self.0, 0.0, 0.0]; count]));
+        cx.publish(MANY_WANTED, f64::from(u8::from(cx.wants_output(MANY))));
+        let few = FEW.with(points(1));
+        Ok(if cx.wants_output(MANY) { few.and(MANY, points(COUNT)) } else { few })
+    }
+}
+
+static TWO: Node = Node::new("Two", 1, "A solver with two outputs.", Cook::solver::<Two>(|_| None))
+    .outputs(&[&FEW, &MANY])
+    .metrics(TWO_METRICS);
+
+#[test]
+fn an_output_of_a_solver_that_nothing_reads_is_not_kept() {
+    let graph = |ports: &[usize]| {
+        let mut graph = TestGraph::new(1, 8);
+        let Link { node, .. } = graph.add("two", &TWO).done();
+        for port in ports {
+            graph.output(Link { node, port: *port });
+        }
+        graph
+    };
+    // One engine for all: what a cook of one output leaves behind is not taken for the other.
+    let engine = engine(2, 1 << 30);
+    let wanted = |cooked: &Cooked| cooked.node("two").metrics["many_wanted"].values().all(|wanted| *wanted == 1.0);
+    let few = graph(&[0]).cook_in(&engine, 1..=8);
+    assert!(!wanted(&few) && few.report.peak_bytes < COUNT, "{}", few.report.peak_bytes);
+    let many = graph(&[1]).cook_in(&engine, 1..=8);
+    assert!(wanted(&many) && many.report.peak_bytes > 12 * COUNT);
+    assert_eq!(many.geometry(8.0).points().map(Component::point_count), Some(COUNT));
+    let both = graph(&[0, 1]).cook_in(&engine, 1..=8);
+    assert!(wanted(&both) && both.x(8.0) == 8.0 && few.x(8.0) == 8.0 && many.x(8.0) == 8.0);
+    // Results on disk are for cooks of other outputs, too.
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut disk = DiskCache::open(folder.path(), u64::MAX);
+    let frames: Vec<Frame> = (1..=8).map(Frame::whole).collect();
+    assert!(wanted(&graph(&[0]).cook_with(&engine, &frames, Some(&mut disk))));
 }
 
 inputs! { SWEEP_INPUTS: SWEEP_POINTS: Input = Input::one("points", Kind::Points, "Points."); }

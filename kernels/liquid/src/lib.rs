@@ -17,6 +17,7 @@ pub mod carried;
 mod dense;
 pub mod extract;
 pub mod fields;
+mod grids;
 pub mod level_set;
 pub mod marked;
 pub mod markers;

@@ -13,6 +13,11 @@ use crate::shared::attributes::{
 use crate::shared::surface::velocity_at;
 use crate::shared::volume::Lattice;
 
+/// How many points a state has.
+pub(super) fn particle_count(run: &Run) -> usize {
+    run.surface.markers().markers.len() + run.spray.len() + run.motion.tracers().points().len()
+}
+
 /// The points of a state, with the attributes that are wanted.
 ///
 /// # Errors

@@ -1,6 +1,6 @@
 //! The state of a simulation, from frame to frame.
 
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 use engine::prelude::*;
 use liquid::carried::{LiquidMaterial, MaterialPoints};
@@ -18,7 +18,7 @@ use super::carried::CarriedColumns;
 use super::domain::{checks, domain, lattice, settings};
 use super::measured::{euler_characteristic, measured, pool_of};
 use super::openings::{Opening, SINK, SOURCE, Timed};
-use super::particles::particles;
+use super::particles::{particle_count, particles};
 use super::shapes::{Colliders, in_cells};
 use super::spray::{Air, SprayDrop, gathered, rejoining};
 use super::start::liquid_at_start;
@@ -69,9 +69,6 @@ pub(super) struct Run {
     start: MetricValues,
     #[serde(skip)]
     colliders: Option<Colliders>,
-    /// The output at the state's frame.
-    #[serde(skip)]
-    volume: OnceLock<Arc<Volume>>,
 }
 
 impl Chain for Run {
@@ -140,7 +137,6 @@ impl Chain for Run {
             metrics: MetricValues::default(),
             start: start_metrics,
             colliders: Some(colliders),
-            volume: OnceLock::new(),
         };
         run.metrics.set(LIQUID_CELLS, pool_of(&run.surface, |_| 1.0).cells as f64);
         Ok(run)
@@ -151,7 +147,7 @@ impl Chain for Run {
         let colliders = Colliders::within_step(cx, self.colliders.take(), &settings.domain, lattice)?;
         let passed = |frame: Frame| cx.integrals::<2>(frame)[1][1];
         let seconds = passed(cx.frame()) - passed(cx.previous());
-        (self.volume, self.metrics) = (OnceLock::new(), MetricValues::default());
+        self.metrics = MetricValues::default();
         let (report, fast_openings) = match seconds > 0.0 {
             true => self.advance(cx, settings, &colliders, seconds)?,
             false => (LiquidReport { liquid_cells: self.motion.liquid_cells(), ..LiquidReport::default() }, 0),
@@ -175,11 +171,17 @@ impl Chain for Run {
         let surface = surface(cx, &volume, SurfaceDetail::AS_IS)?;
         cx.publish(VOLUME_NOW, self.targets.volume());
         cx.publish(EULER_CHARACTERISTIC, euler_characteristic(&surface));
-        let mut out = Geometry::default();
-        out.put_volume(volume.clone());
-        let particles = particles(cx, self, lattice(cx), &volume)?;
-        cx.publish(PARTICLES_NOW, particles.point_count() as f64);
-        Ok(SURFACE.with(Geometry::from(surface)).and(PARTICLES, Geometry::from(particles)).and(VOLUME, out))
+        cx.publish(PARTICLES_NOW, particle_count(self) as f64);
+        let mut outputs = SURFACE.with(Geometry::from(surface));
+        if cx.wants_output(PARTICLES) {
+            outputs = outputs.and(PARTICLES, Geometry::from(particles(cx, self, lattice(cx), &volume)?));
+        }
+        if cx.wants_output(VOLUME) {
+            let mut out = Geometry::default();
+            out.put_volume(volume);
+            outputs = outputs.and(VOLUME, out);
+        }
+        Ok(outputs)
     }
 }
 
@@ -341,26 +343,20 @@ impl Run {
     }
 
     /// The output's volume: the level set without what lies inside colliders, and the velocity.
-    #[expect(clippy::disallowed_methods, reason = "only moves what is there")]
     fn volume(&self, cx: &FrameCx) -> Result<Arc<Volume>> {
-        if let Some(volume) = self.volume.get() {
-            return Ok(volume.clone());
-        }
         let (lattice, settings) = (lattice(cx), settings(cx));
         let bounds = [settings.domain.low, settings.domain.high];
         // `cfl` may ask for more cells than liquid moves.
         let moved = self.metrics.get(CFL_REACHED).unwrap_or_default().max(LEAST_MOVED);
         let layers = BAND as i32 + settings.cfl.min(moved).ceil() as i32;
-        let velocity = Liquid::resume(settings, self.surface.clone(), self.motion.clone()).velocity(layers);
+        let velocity = self.motion.velocity_past_liquid(&settings.domain, layers);
         let by = self.surface.resolution();
         let colliders = Colliders::now(cx, &domain(cx), lattice);
         let solid = |point: [f32; 3]| colliders.distance(1.0, point);
         let outside = colliders.solid(&solid).map(|solid| self.surface.phi_outside(solid));
         let view = self.surface.level_set().view();
         let phi = outside.as_deref().unwrap_or(view.phi);
-        let volume = volume(PhiView { phi, ..view }, lattice.refined(by), &velocity, bounds, lattice)?;
-        let volume = Arc::new(volume);
-        Ok(self.volume.get_or_init(|| volume).clone())
+        Ok(Arc::new(volume(PhiView { phi, ..view }, lattice.refined(by), &velocity, bounds, lattice)?))
     }
 }
 

@@ -63,6 +63,10 @@ const SLICE_SHARE: u32 = 16;
 /// Bytes of results a slice should hold: a few times a core's cache, so that a node finds its input there.
 const SLICE_BYTES: usize = 16 << 20;
 
+/// The same where there is a solver: a step goes through more memory than any cache holds, so results of the frames before
+/// are not found there.
+const SOLVER_SLICE_BYTES: usize = 4 << 20;
+
 /// The state of a window or solver after a frame.
 struct ChainState {
     at: i64,
@@ -267,7 +271,9 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
                 (most.as_nanos() / time.as_nanos().max(1)) as usize
             }
         };
-        (SLICE_BYTES / bytes).min(in_time).clamp(threads.min(most), most)
+        let has_solver = self.plan.nodes.iter().any(|planned| planned.needed && planned.has_solver);
+        let wanted = if has_solver { SOLVER_SLICE_BYTES } else { SLICE_BYTES };
+        (wanted / bytes).min(in_time).clamp(threads.min(most), most)
     }
 
     /// Cooks some frames of all outputs of the request.

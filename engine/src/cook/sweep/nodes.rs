@@ -198,6 +198,7 @@ impl<'g> Sweep<'_, 'g, '_> {
             inputs,
             live: self.plan.nodes[node].live.as_deref(),
             if_there: &self.plan.nodes[node].if_there,
+            outputs_used: &self.plan.nodes[node].outputs_used,
             cancel: self.cancel,
             clock: scene.clock(),
             origin: scene.origin,

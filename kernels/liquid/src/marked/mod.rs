@@ -29,15 +29,17 @@ const FACING: f32 = 0.7;
 /// diagonal of a cell.
 const FILM: f32 = 1.8;
 
-/// What φ rises in a cell above a solid: up to the first it is no film; from the second on it is, however uneven: in grooves
-/// where lobes met φ rises by a half.
+/// How much larger φ must be a cell farther from the solid for a place to count as a film on it: at the first value it does
+/// not, from the second on it does fully. φ rises by 1 over an even film, by a half in a groove where lobes met, and hardly
+/// at all where a surface meets the solid at a right angle.
 const RISE: [f32; 2] = [0.2, 0.5];
 
-/// The same beside a shore, where a pool meets the solid, and above a thin solid, where only a film that lies flat is sure not
-/// to be of both sides.
+/// The same where only even films count: beside a shore, where the surface of a pool meets the solid, and on a thin solid,
+/// where other surfaces may belong to liquid on its far side.
 const RISE_OF_EVEN: [f32; 2] = [0.8, 0.95];
 
-/// Surface cells towards where liquid gets thinner in which a shore ends it, and a groove does not.
+/// How far to look for a shore, in surface cells, towards where liquid gets thinner: at a shore the solid is dry there, in a
+/// groove it is not.
 const BESIDE: f32 = 3.0;
 
 /// Distance, in surface cells, that films on both sides of a thin solid keep from its middle.

@@ -4,6 +4,7 @@
 //! its children are liquid as air. And the distance of the surface from a coarse cell is kept for each face apart: the
 //! mean over the four columns of children that cross the face.
 
+use crate::grids::{Children, at_low_face};
 use crate::rows::{Cell, CellRows, Finder};
 use crate::stencil::Stencil;
 
@@ -37,19 +38,11 @@ pub(super) fn coarsened(fine: &Level, distances: &SurfaceDistances) -> Option<(L
 }
 
 fn kind(fine: &Level, finder: &Finder<'_>, coarse: Cell) -> CellKind {
-    let (mut liquid, mut air) = (0, 0);
-    for child in 0..8 {
-        let offset = [child & 1, child >> 1 & 1, child >> 2];
-        let Some(at) = finder.find([0, 1, 2].map(|axis| 2 * coarse[axis] + offset[axis])) else { continue };
-        match fine.kinds[at] {
-            CellKind::Liquid => liquid += 1,
-            CellKind::Air => air += 1,
-            CellKind::Solid => {}
-        }
-    }
-    match (liquid, air) {
-        (0, 0) => CellKind::Solid,
-        _ if liquid >= air => CellKind::Liquid,
+    let is = |kind: CellKind| move |at: usize| fine.kinds[at] == kind;
+    let children = Children::of(finder, coarse, is(CellKind::Liquid), is(CellKind::Air));
+    match children {
+        _ if children.are_liquid() => CellKind::Liquid,
+        Children { air: 0, .. } => CellKind::Solid,
         _ => CellKind::Air,
     }
 }
@@ -58,24 +51,13 @@ fn kind(fine: &Level, finder: &Finder<'_>, coarse: Cell) -> CellKind {
 /// any liquid, and open.
 fn weight(weights: &[f32], finder: &Finder<'_>, coarse: Cell, axis: usize) -> f32 {
     let (mut sum, mut count) = (0.0, 0.0);
-    for column in columns(coarse, axis) {
+    for column in at_low_face(coarse, axis) {
         if let Some(at) = finder.find(column) {
             sum += weights[at];
             count += 1.0;
         }
     }
     if count > 0.0 { 2.0 * sum / count } else { 2.0 }
-}
-
-/// The four children of a coarse cell next to its low face along `axis`.
-fn columns(coarse: Cell, axis: usize) -> [Cell; 4] {
-    let (side, other) = ((axis + 1) % 3, (axis + 2) % 3);
-    [0, 1, 2, 3].map(|column| {
-        let mut cell = coarse.map(|n| 2 * n);
-        cell[side] += column & 1;
-        cell[other] += column >> 1;
-        cell
-    })
 }
 
 fn coarse_distances(
@@ -103,7 +85,7 @@ fn coarse_distances(
 /// liquid is below the face where `towards` is 1, above it where −1.
 fn distance(fine: &Level, finder: &Finder<'_>, distances: &[f32], coarse: Cell, axis: usize, towards: i32) -> f32 {
     let (mut sum, mut count) = (0.0, 0.0);
-    for column in columns(coarse, axis) {
+    for column in at_low_face(coarse, axis) {
         // Four cells from within the liquid outwards, the face between the second and the third.
         let first = if towards > 0 { column[axis] - 2 } else { column[axis] + 1 };
         let child = |n: usize| {

@@ -1,6 +1,7 @@
 //! One multigrid V-cycle: an approximate solution of A·q = b, symmetric in b, in `f32`.
 
 use crate::fields::{divide_into, multiply_into};
+use crate::grids::coarsened_to;
 use crate::stencil::Run;
 use crate::transfer::{Place, add_interpolated, restrict};
 
@@ -39,23 +40,13 @@ pub(super) struct Workspace(Vec<Scratch>);
 impl Multigrid {
     /// `distances`: of the surface, on the finest grid.
     pub(super) fn new(finest: Level, distances: &SurfaceDistances) -> Self {
-        let (mut levels, mut coarser) = (vec![finest], None);
-        loop {
-            let fine = &levels[levels.len() - 1];
-            let cells = fine.stencil.active().len();
-            if cells <= DIRECT {
-                break;
-            }
-            let Some((coarse, coarse_distances)) = coarsened(fine, coarser.as_ref().unwrap_or(distances)) else {
-                break;
-            };
-            // Scattered drops, or a grid that is one cell wide, do not get coarser.
-            if coarse.stencil.active().len() * 10 > cells * 9 {
-                break;
-            }
-            levels.push(coarse);
-            coarser = Some(coarse_distances);
-        }
+        let mut coarser = None;
+        let coarsen = |fine: &Level| {
+            let (coarse, distances) = coarsened(fine, coarser.as_ref().unwrap_or(distances))?;
+            coarser = Some(distances);
+            Some(coarse)
+        };
+        let levels = coarsened_to(DIRECT, finest, |level| level.stencil.active().len(), coarsen);
         let scales = levels.windows(2).map(|pair| scales(&pair[0], &pair[1])).collect();
         let coarsest = &levels[levels.len() - 1];
         let factors = (coarsest.stencil.active().len() <= DIRECT).then(|| Factors::new(coarsest));

@@ -294,11 +294,7 @@ impl<S: Surface> Liquid<S> {
 
     /// The velocity, m/s, continued `layers` cells past the liquid, but no farther than a substep follows it.
     pub fn velocity(&self, layers: i32) -> MacVelocity {
-        let (domain, layers) = (&self.settings.domain, layers.min(substep::most_layers()));
-        let rows = self.motion.rows_past_liquid(domain, layers);
-        let own = self.motion.velocity().faces();
-        let [faces] = self.motion.continued([own], &rows, f32::INFINITY, domain, None);
-        MacVelocity::new(rows, faces)
+        self.motion.velocity_past_liquid(&self.settings.domain, layers)
     }
 
     /// Moves on by `seconds`, in as many substeps as the speed asks for.

@@ -10,6 +10,7 @@ use crate::rows::{Cell, CellRows, Finder, Images};
 use crate::step::domain::{Domain, Obstacle};
 use crate::step::outflow::Outflow;
 use crate::step::sources::FlowAccount;
+use crate::step::substep::most_layers;
 use crate::step::{LiquidSettings, Moving, Surface, Surroundings, Wall};
 use crate::velocity::{ALL_FACES, FaceFields, FaceMask, MacVelocity, Sampler, Site, extrapolate_first, resampled};
 
@@ -149,6 +150,13 @@ impl Motion {
             Some(at) => f64::from(*fast.select_nth_unstable_by(at, f32::total_cmp).1),
             None => largest / most,
         }
+    }
+
+    /// The velocity, m/s, continued `layers` cells past the liquid, but no farther than a substep follows it.
+    pub fn velocity_past_liquid(&self, domain: &Domain, layers: i32) -> MacVelocity {
+        let rows = self.rows_past_liquid(domain, layers.min(most_layers()));
+        let [faces] = self.continued([self.velocity.faces()], &rows, f32::INFINITY, domain, None);
+        MacVelocity::new(rows, faces)
     }
 
     /// The rows of the velocity and `layers` cells past the liquid.

@@ -1,6 +1,7 @@
 //! The viscous equation on a grid with cells twice as large: the same discretisation, from means of masses and
 //! viscosities over the volume that each coarse value stands for.
 
+use crate::grids::{Children, at_low_face};
 use crate::rows::{Cell, CellRows, Finder, Periods};
 use crate::stencil::Stencil;
 
@@ -114,30 +115,15 @@ impl<'a> Finer<'a> {
     /// Whether at least as many children are liquid as air.
     fn is_liquid(&self, coarse: Cell) -> bool {
         let fine = self.level;
-        let (mut liquid, mut air) = (0, 0);
-        for child in 0..8 {
-            let offset = [child & 1, child >> 1 & 1, child >> 2];
-            let Some(at) = self.cells.find([0, 1, 2].map(|axis| 2 * coarse[axis] + offset[axis])) else { continue };
-            if fine.liquid[at] {
-                liquid += 1;
-            } else if fine.kinds.iter().any(|kinds| kinds[at] == FaceKind::Air) {
-                air += 1;
-            }
-        }
-        liquid > 0 && liquid >= air
+        let is_air = |at: usize| fine.kinds.iter().any(|kinds| kinds[at] == FaceKind::Air);
+        Children::of(&self.cells, coarse, |at| fine.liquid[at], is_air).are_liquid()
     }
 
     /// Whether at least two of the four fine faces are solid.
     fn is_solid(&self, coarse: Cell, axis: usize) -> bool {
-        let fine = self.level;
-        let (side, other) = ((axis + 1) % 3, (axis + 2) % 3);
-        let solid = (0..4).filter(|child| {
-            let mut cell = coarse.map(|n| 2 * n);
-            cell[side] += child & 1;
-            cell[other] += child >> 1;
-            self.cells.find(cell).is_some_and(|at| fine.kinds[axis][at] == FaceKind::Solid)
-        });
-        solid.count() >= 2
+        let kinds = &self.level.kinds[axis];
+        let is_solid = |cell: &Cell| self.cells.find(*cell).is_some_and(|at| kinds[at] == FaceKind::Solid);
+        at_low_face(coarse, axis).iter().filter(|cell| is_solid(cell)).count() >= 2
     }
 
     /// The sum over the fine values in a coarse one's volume, each times its share of that volume: `halfway` along the axes

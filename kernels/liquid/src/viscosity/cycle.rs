@@ -1,6 +1,7 @@
 //! One multigrid V-cycle: an approximate solution of A·u = b in `f32`.
 
 use crate::fields::{add_scaled, divide_into, dot, in_parts, scale_and_add};
+use crate::grids::coarsened_to;
 use crate::stencil::Run;
 use crate::transfer::{Place, add_interpolated, restrict};
 
@@ -38,20 +39,8 @@ pub(super) struct Workspace(Vec<Scratch>);
 impl Multigrid {
     /// `is_light`: mass outweighs viscosity everywhere, so that no error is too smooth for the smoother.
     pub(super) fn new(finest: Level, is_light: bool) -> Self {
-        let mut levels = vec![finest];
-        loop {
-            let fine = &levels[levels.len() - 1];
-            let cells = fine.stencil.active().len();
-            if is_light || cells <= COARSEST {
-                break;
-            }
-            let Some(coarse) = coarsened(fine) else { break };
-            // Scattered drops, or a grid that is one cell wide, do not get coarser.
-            if coarse.stencil.active().len() * 10 > cells * 9 {
-                break;
-            }
-            levels.push(coarse);
-        }
+        let fewest = if is_light { usize::MAX } else { COARSEST };
+        let levels = coarsened_to(fewest, finest, |level| level.stencil.active().len(), coarsened);
         let scales = levels.windows(2).map(|pair| scales(&pair[0], &pair[1])).collect();
         Self { levels, scales, is_light }
     }
