@@ -103,9 +103,9 @@ impl<R: Region> Iterator for Walk<'_, R> {
                 continue;
             }
             let Some(block) = self.tree.blocks.get(child) else { continue };
-            let lanes = self.region.meeting(&block.boxes()) & block.filled();
-            if lanes != 0 {
-                return Some((child, lanes));
+            let lanes = self.region.meeting(&block.boxes());
+            if lanes != 0 && lanes & block.filled() != 0 {
+                return Some((child, lanes & block.filled()));
             }
         }
         None

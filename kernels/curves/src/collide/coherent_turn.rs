@@ -21,7 +21,7 @@ pub(super) struct WayOut<'a> {
     pub(super) others: &'a [&'a TriangleTree],
 }
 
-impl Segment {
+impl Segment<'_> {
     /// Turns with coherence. Afterwards `nearby` holds everything that the segment may cross in its new direction.
     #[inline(always)]
     pub(super) fn turn_coherently<'t>(

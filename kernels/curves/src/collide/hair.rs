@@ -5,6 +5,7 @@ use super::crossing::{first_crossing, first_crossing_in};
 use super::half_space::HalfSpace;
 use super::root_surface::RootSurface;
 use super::segment_turn::{Nearby, Segment, Turned};
+use super::turn_axes::TurnAxes;
 use super::{Collide, Reached, perpendicular};
 use nalgebra::Quaternion;
 use numerics::masked::Masked;
@@ -36,14 +37,13 @@ pub(super) struct Scratch<'t> {
     goal: Vec<DVec3>,
     /// Direction of each segment; zero where it has no length.
     directions: Vec<DVec3>,
+    axes: TurnAxes,
 }
 
 /// State passed from one segment to the next.
 struct Carried {
     /// Composition of all rotations so far.
     rotation: DQuat,
-    /// The axis about which a segment turns whose goal is opposite to it.
-    axis: DVec3,
     /// Direction of the previous segment; zero at the root.
     before: DVec3,
 }
@@ -65,70 +65,76 @@ impl Hair<'_> {
         }
         let shift = self.shift;
         self.set_goals(how, &shift, &mut scratch.goal);
-        let Scratch { nearby, goal, directions } = scratch;
+        let Scratch { nearby, goal, directions, axes } = scratch;
         directions.clear();
+        axes.clear();
         if shift != DVec3::zeros() {
             self.out[0] = to_f32(goal[0]);
         }
         let largest = self.goal.iter().fold(0.0, |most: f32, cv| most.max(vector::largest(*cv)));
-        let mut carried = Carried { rotation: DQuat::identity(), axis: DVec3::zeros(), before: DVec3::zeros() };
+        let mut carried = Carried { rotation: DQuat::identity(), before: DVec3::zeros() };
+        let mut change = LengthChange::default();
         for k in 0..cvs - 1 {
             let along = goal[k + 1] - goal[k];
             let length = (to_f64(self.goal[k + 1]) - to_f64(self.goal[k])).norm();
             if length == 0.0 || along.norm() == 0.0 {
                 self.out[k + 1] = self.out[k];
                 directions.push(DVec3::zeros());
+                change.add(length, 0.0);
                 continue;
             }
             let wanted = along / along.norm();
             let rounding = 1.2e-7 * (f64::from(largest) + length);
-            let (segment, ground) = self.segment(how, k, &wanted, [length, rounding], &mut carried);
+            let (segment, ground) = self.segment(how, k, &wanted, [length, rounding], &carried, axes);
             let way_out = ground.map(|(up, rest)| WayOut { up, rest, others });
             // Not if the skin redirects the segment, or if its goal was raised.
             let may_keep_goal = segment.to == wanted && goal[k + 1] == to_f64(self.goal[k + 1]);
             let direction = self.turn(how, k, (&segment, way_out.as_ref()), may_keep_goal, nearby, &mut reached);
-            carried.rotation = smallest_rotation(&segment.from, &direction, &carried.axis) * carried.rotation;
+            change.add(length, (to_f64(self.out[k + 1]) - segment.pivot).norm());
+            let is_last = k + 2 == cvs;
+            if !is_last {
+                carried.rotation = smallest_rotation(&segment.from, &direction, segment.axes) * carried.rotation;
+            }
             carried.before = direction;
             directions.push(direction);
         }
-        if reached.unfreed_segments > 0 && self.fall_back(how, directions) {
+        let fell_back = reached.unfreed_segments > 0 && self.fall_back(how, directions);
+        if fell_back {
             (reached.unfreed_segments, reached.deepest_overlap, reached.blended_to_rest) = (0, 0.0, 1);
         }
-        reached.crossings_left = match self.blend(how, &shift) {
-            false => reached.unfreed_segments,
-            true => self.crossings(how),
-        };
-        reached.length_error = self.length_error();
+        let blended = self.blend(how, &shift);
+        reached.crossings_left = if blended { self.crossings(how) } else { reached.unfreed_segments };
+        reached.length_error = if blended || fell_back { self.length_error() } else { change.share() };
         reached
     }
 
     /// The segment from CV k, about to turn towards the unit vector `wanted`; with coherence, the
     /// skin's normal under it and its direction at rest.
     #[inline(always)]
-    fn segment(
+    fn segment<'a>(
         &self,
         how: &Collide<'_>,
         k: usize,
         wanted: &DVec3,
         [length, rounding]: [f64; 2],
-        carried: &mut Carried,
-    ) -> (Segment, Option<(DVec3, DVec3)>) {
+        carried: &Carried,
+        axes: &'a mut TurnAxes,
+    ) -> (Segment<'a>, Option<(DVec3, DVec3)>) {
         let rest = to_f64(self.rest[k + 1]) - to_f64(self.rest[k]);
         let rest = (rest.norm() > 0.0).then(|| rest / rest.norm());
         let from = rest.map_or(*wanted, |rest| carried.rotation * rest);
-        carried.axis = perpendicular(&from, &carried.axis);
-        let axis = carried.axis;
+        axes.push(from);
         let pivot = to_f64(self.out[k]);
         let (mut to, mut way_out) = (*wanted, None);
         if let Some((ground, coherence)) = how.ground(self.first + k, &pivot, length) {
-            to = part_way(wanted, &ground.lead_out(&from, wanted, length), &axis, coherence);
+            to = part_way(wanted, &ground.lead_out(&from, wanted, length), &axes.last(), coherence);
             way_out = Some((ground.normal, rest.unwrap_or(*wanted)));
         }
         let segment = Segment {
             pivot,
             from,
             to,
-            axis,
+            axes,
             before: carried.before,
             length,
             half: 0.5 * f64::from(how.width.at(self.first + k)),
@@ -152,7 +158,7 @@ impl Hair<'_> {
         &mut self,
         how: &Collide<'t>,
         k: usize,
-        (segment, way_out): (&Segment, Option<&WayOut<'t>>),
+        (segment, way_out): (&Segment<'_>, Option<&WayOut<'t>>),
         may_keep_goal: bool,
         nearby: &mut Nearby<'t>,
         reached: &mut Reached,
@@ -192,18 +198,18 @@ impl Hair<'_> {
 
     /// The largest change of a segment's length, relative to the curve's.
     fn length_error(&self) -> f64 {
-        let (mut worst, mut whole) = (0.0_f64, 0.0);
+        let mut change = LengthChange::default();
+        let length = |cvs: &[Vec3], k: usize| (to_f64(cvs[k]) - to_f64(cvs[k - 1])).norm();
         for k in 1..self.out.len() {
-            let length = (to_f64(self.goal[k]) - to_f64(self.goal[k - 1])).norm();
-            worst = worst.max(((to_f64(self.out[k]) - to_f64(self.out[k - 1])).norm() - length).abs());
-            whole += length;
+            change.add(length(self.goal, k), length(self.out, k));
         }
-        if whole > 0.0 { worst / whole } else { 0.0 }
+        change.share()
     }
 
     fn is_finite(&self) -> bool {
-        let cvs = || self.goal.iter().chain(self.rest);
-        cvs().all(|cv| cv.iter().all(|x| x.is_finite()))
+        // Without a branch between them, which the compiler would not vectorise.
+        let finite = |cvs: &[Vec3]| cvs.as_flattened().iter().fold(true, |finite, x| finite & x.is_finite());
+        finite(self.goal) & finite(self.rest)
     }
 
     /// The CVs' goals: the input, or kept off the skin by a share of their rest heights.
@@ -296,11 +302,33 @@ impl Hair<'_> {
     }
 }
 
+/// How the lengths of a curve's segments change.
+#[derive(Default)]
+struct LengthChange {
+    /// The largest change, and the sum of the lengths before, metres.
+    largest: f64,
+    whole: f64,
+}
+
+impl LengthChange {
+    #[inline(always)]
+    fn add(&mut self, before: f64, now: f64) {
+        self.largest = self.largest.max((now - before).abs());
+        self.whole += before;
+    }
+
+    /// The largest change, relative to the curve's length; 0 for a curve without length.
+    #[inline(always)]
+    fn share(&self) -> f64 {
+        if self.whole > 0.0 { self.largest / self.whole } else { 0.0 }
+    }
+}
+
 /// How a segment's turn ends. Not a closure: one as large is not inlined, and compiled without the path's instructions.
 #[inline(always)]
 fn turned_by<'t>(
     how: &Collide<'t>,
-    segment: &Segment,
+    segment: &Segment<'_>,
     way_out: Option<&WayOut<'t>>,
     nearby: &mut Nearby<'t>,
 ) -> Turned {
@@ -319,9 +347,9 @@ pub(super) fn part_way(from: &DVec3, to: &DVec3, axis: &DVec3, share: f64) -> DV
     from * cosine + n.cross(from) * sine
 }
 
-/// The smallest rotation from one unit vector to another; about `axis` if they are opposite.
-fn smallest_rotation(from: &DVec3, to: &DVec3, axis: &DVec3) -> DQuat {
+/// The smallest rotation from one unit vector to another; about the last of `axes` if they are opposite.
+fn smallest_rotation(from: &DVec3, to: &DVec3, axes: &TurnAxes) -> DQuat {
     let real = 1.0 + from.dot(to);
-    let imaginary = if real > 1e-12 { from.cross(to) } else { *axis };
+    let imaginary = if real > 1e-12 { from.cross(to) } else { axes.last() };
     DQuat::new_normalize(Quaternion::from_parts(if real > 1e-12 { real } else { 0.0 }, imaginary))
 }

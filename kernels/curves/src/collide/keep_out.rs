@@ -236,7 +236,7 @@ impl Clearance {
     }
 }
 
-kernel! {
+kernel! { avx512
     fn look_up(curves: Range<usize>, starts: &[u32], how: &KeepOut<'_>, out: &mut [HalfSpace]) = look_up_task;
 }
 

@@ -24,6 +24,7 @@ mod segment_turn;
 mod skin;
 mod towards_rest;
 mod triangle_filter;
+mod turn_axes;
 
 use coherence::Ground;
 use hair::{Hair, Scratch};

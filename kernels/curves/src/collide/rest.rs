@@ -165,7 +165,7 @@ pub fn at_rest(starts: &[u32], rest: &[Vec3], how: &Collide<'_>) -> AtRest {
     found
 }
 
-kernel! {
+kernel! { avx512
     fn grow(ends: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut Grown) = grow_task;
 }
 
@@ -192,7 +192,7 @@ fn grow_task(ends: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut Grown) 
     }
 }
 
-kernel! {
+kernel! { avx512
     fn look_up(
         ends: &[u32],
         rest: &[Vec3],

@@ -39,8 +39,20 @@ pub(super) struct Blocked {
     pub(super) hi_radius: f64,
 }
 
+/// What a triangle does to a turn.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Obstruction {
+    /// Whether it blocks the turn at its start.
+    pub(super) at_start: bool,
+    /// The least angle ahead at which it stops the turn, `back` before a contact.
+    pub(super) stop: Option<f64>,
+}
+
 /// A point of the plane, along u and v.
 pub(super) type P2 = [f64; 2];
+
+/// Sine of the angle between the ends of a piece above which rounding does not decide on which side of each other they lie.
+const CLEARLY_APART: f64 = 1e-12;
 
 impl Sector {
     /// The direction after a turn by `angle`.
@@ -52,9 +64,8 @@ impl Sector {
         self.u * cosine + self.v * sine
     }
 
-    /// Calls `found` with each interval of angles that the triangle blocks; may leave out intervals behind the segment
-    /// and those that stop no turn before the direction `until`.
-    pub(super) fn blocked_before(&self, until: P2, corners: &[DVec3; 3], mut found: impl FnMut(Blocked)) {
+    /// What the triangle does to a turn to the direction `until`; may leave out where it stops no turn before that.
+    pub(super) fn obstruction(&self, until: P2, corners: &[DVec3; 3]) -> Obstruction {
         // A point at radius r that lies `back` beyond the ray at angle α is past α by asin(back/r) ≥ back/r.
         let over = |p: P2| until[0] * p[1] - until[1] * p[0] >= self.back;
         let counts = |p: P2, q: P2| match [p[1] < 0.0, q[1] < 0.0] {
@@ -64,44 +75,52 @@ impl Sector {
             [true, false] => p[0] * q[1] >= q[0] * p[1] || !over(q),
             [false, true] => q[0] * p[1] >= p[0] * q[1] || !over(p),
         };
-        self.blocked(corners, counts, &mut found);
+        let mut found = Obstruction::default();
+        if self.half == 0.0 {
+            self.pieces(corners, |p, q| {
+                if counts(p, q) {
+                    found.add_piece(p, q, self.back);
+                }
+            });
+        } else {
+            self.blocked_by(corners, |blocked| found.add(&blocked, self.back));
+        }
+        found
     }
 
     /// Calls `found` with each interval of angles that the triangle blocks.
     pub(super) fn blocked_by(&self, corners: &[DVec3; 3], mut found: impl FnMut(Blocked)) {
-        self.blocked(corners, |_, _| true, &mut found);
-    }
-
-    /// As [`Sector::blocked_by`], restricted to pieces for which `counts` holds where the segment has no thickness.
-    fn blocked(&self, corners: &[DVec3; 3], counts: impl Fn(P2, P2) -> bool, mut found: impl FnMut(Blocked)) {
-        let heights = corners.map(|corner| self.n.dot(&(corner - self.pivot)));
-        let flat = |k: usize| {
-            let from_pivot = corners[k] - self.pivot;
-            [self.u.dot(&from_pivot), self.v.dot(&from_pivot)]
-        };
         if self.half == 0.0 {
-            if let Some(piece) = slice(&heights, 0.0, flat) {
-                self.within_reach(piece, |p, q| {
-                    if counts(p, q) {
-                        found(Blocked::between(p, q));
-                    }
-                });
-            }
+            self.pieces(corners, |p, q| found(Blocked::between(p, q)));
             return;
         }
+        let heights = self.heights(corners);
         let low = heights.iter().fold(f64::INFINITY, |low, h| low.min(*h));
         let high = heights.iter().fold(f64::NEG_INFINITY, |high, h| high.max(*h));
-        if low > self.half || high < -self.half {
-            return;
+        if low <= self.half && high >= -self.half {
+            self.blocked_in_slab(&heights, corners.each_ref().map(|corner| self.flat(corner)), found);
         }
-        self.blocked_in_slab(
-            &heights,
-            corners.each_ref().map(|corner| {
-                let from_pivot = *corner - self.pivot;
-                [self.u.dot(&from_pivot), self.v.dot(&from_pivot)]
-            }),
-            found,
-        );
+    }
+
+    /// Calls `found` with the ends of each piece in which the triangle cuts the plane of the turn.
+    #[inline(always)]
+    fn pieces(&self, corners: &[DVec3; 3], found: impl FnMut(P2, P2)) {
+        if let Some(piece) = slice(&self.heights(corners), 0.0, |k| self.flat(&corners[k])) {
+            self.within_reach(piece, found);
+        }
+    }
+
+    /// Heights above the plane.
+    #[inline(always)]
+    fn heights(&self, corners: &[DVec3; 3]) -> [f64; 3] {
+        corners.map(|corner| self.n.dot(&(corner - self.pivot)))
+    }
+
+    /// A point, projected to the plane.
+    #[inline(always)]
+    fn flat(&self, point: &DVec3) -> P2 {
+        let from_pivot = point - self.pivot;
+        [self.u.dot(&from_pivot), self.v.dot(&from_pivot)]
     }
 
     /// As [`Sector::blocked_by`] for a thick segment.
@@ -154,6 +173,7 @@ impl Sector {
 
     /// Calls `found` with the ends of each part of a straight piece inside the circle of `reach` and outside that of
     /// `inner`.
+    #[inline(always)]
     fn within_reach(&self, [p, q]: [P2; 2], mut found: impl FnMut(P2, P2)) {
         let Some([from, to]) = inside_circle(p, q, self.reach) else { return };
         let at = |t: f64| [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
@@ -162,8 +182,9 @@ impl Sector {
                 found(at(from), at(to));
             }
         };
-        match inside_circle(p, q, self.inner) {
-            Some([near, far]) if self.inner > 0.0 => {
+        let skipped = if self.inner > 0.0 { inside_circle(p, q, self.inner) } else { None };
+        match skipped {
+            Some([near, far]) => {
                 if near > from {
                     part(from, near.min(to));
                 }
@@ -171,7 +192,7 @@ impl Sector {
                     part(far.max(from), to);
                 }
             }
-            _ => part(from, to),
+            None => part(from, to),
         }
     }
 }
@@ -179,10 +200,7 @@ impl Sector {
 impl Blocked {
     /// The angles of a straight piece between two points, neither at the pivot.
     fn between(p: P2, q: P2) -> Self {
-        let left = p[0] * q[1] - p[1] * q[0] >= 0.0;
-        let (first, last) = if left { (p, q) } else { (q, p) };
-        let angle = |p: P2| libm::atan2(p[1], p[0]);
-        let radius = |p: P2| (p[0] * p[0] + p[1] * p[1]).sqrt();
+        let (first, last) = in_order(p, q);
         let (lo, hi) = (angle(first), angle(last));
         // An interval across the opposite direction continues past π.
         let hi = if hi < lo { hi + std::f64::consts::TAU } else { hi };
@@ -190,8 +208,64 @@ impl Blocked {
     }
 }
 
+impl Obstruction {
+    /// Adds the piece between two points, neither at the pivot: as [`Obstruction::add`] of [`Blocked::between`], but finds
+    /// only the angles that count.
+    #[inline(always)]
+    fn add_piece(&mut self, p: P2, q: P2, back: f64) {
+        let ([x, y], [last_x, last_y]) = in_order(p, q);
+        // It runs from behind the start to its front, on the side that the turn leaves.
+        if y < 0.0 && last_y > 0.0 {
+            self.at_start = true;
+            return;
+        }
+        let lo = if y > 0.0 { angle([x, y]) } else { 0.0 };
+        let sizes = (x.abs() + y.abs()) * (last_x.abs() + last_y.abs());
+        // From an angle in 0…π it runs to a larger one, less than π farther: never around to the start.
+        if lo > 0.0 && x * last_y - y * last_x > CLEARLY_APART * sizes {
+            self.stop_at(lo, radius([x, y]), back);
+        } else {
+            self.add(&Blocked::between(p, q), back);
+        }
+    }
+
+    /// Adds an interval.
+    #[inline(always)]
+    fn add(&mut self, blocked: &Blocked, back: f64) {
+        // It contains the angle 0, or a full turn.
+        self.at_start |= (blocked.lo <= 0.0 && blocked.hi >= 0.0) || blocked.hi >= std::f64::consts::TAU;
+        if blocked.lo > 0.0 {
+            self.stop_at(blocked.lo, blocked.lo_radius, back);
+        }
+    }
+
+    /// Adds a contact at an angle, at a distance from the pivot.
+    #[inline(always)]
+    fn stop_at(&mut self, angle: f64, radius: f64, back: f64) {
+        let angle = (angle - back / radius).max(0.0);
+        self.stop = Some(self.stop.map_or(angle, |least| least.min(angle)));
+    }
+}
+
+/// The ends of a straight piece, counter-clockwise.
+#[inline(always)]
+fn in_order(p: P2, q: P2) -> (P2, P2) {
+    if p[0] * q[1] - p[1] * q[0] >= 0.0 { (p, q) } else { (q, p) }
+}
+
+#[inline(always)]
+fn angle(p: P2) -> f64 {
+    libm::atan2(p[1], p[0])
+}
+
+#[inline(always)]
+fn radius(p: P2) -> f64 {
+    (p[0] * p[0] + p[1] * p[1]).sqrt()
+}
+
 /// Where the plane at height `level` cuts a triangle with corners at these heights. A corner at the level counts as
 /// above it in every triangle, so that a closed surface is cut along closed lines.
+#[inline(always)]
 fn slice(heights: &[f64; 3], level: f64, flat: impl Fn(usize) -> P2) -> Option<[P2; 2]> {
     let above = heights.map(|height| height >= level);
     let alone = match above {
@@ -200,9 +274,10 @@ fn slice(heights: &[f64; 3], level: f64, flat: impl Fn(usize) -> P2) -> Option<[
         [a, b, c] if a == c && b != c => 1,
         _ => 2,
     };
+    let from = flat(alone);
     let cut = |other: usize| {
         let share = (level - heights[alone]) / (heights[other] - heights[alone]);
-        let (from, to) = (flat(alone), flat(other));
+        let to = flat(other);
         [from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1])]
     };
     Some([cut((alone + 1) % 3), cut((alone + 2) % 3)])
@@ -221,6 +296,7 @@ fn between_levels([p, q]: [P2; 2], [a, b]: [f64; 2], half: f64) -> Option<[P2; 2
 }
 
 /// The parameters, 0..1, at which the piece from p to q enters and leaves the circle about the origin.
+#[inline(always)]
 fn inside_circle(p: P2, q: P2, radius: f64) -> Option<[f64; 2]> {
     let side = [q[0] - p[0], q[1] - p[1]];
     let square = side[0] * side[0] + side[1] * side[1];

@@ -2,8 +2,9 @@
 //! something.
 
 use super::crossing::{Crossing, corners, first_crossing};
-use super::sector::{Blocked, Sector};
+use super::sector::Sector;
 use super::triangle_filter::Wedge;
+use super::turn_axes::TurnAxes;
 use super::{ContactMethod, perpendicular};
 use numerics::tree::{Block, Cuboid, TriangleTree};
 use numerics::vector::{DVec3, Vec3, to_f32};
@@ -14,14 +15,14 @@ const STRAIGHT_IN: f64 = 1e-3;
 
 /// A segment about to turn.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Segment {
+pub(super) struct Segment<'a> {
     /// The fixed end.
     pub(super) pivot: DVec3,
     /// Its direction, and that of its goal: unit.
     pub(super) from: DVec3,
     pub(super) to: DVec3,
-    /// The axis about which it turns if the two are opposite.
-    pub(super) axis: DVec3,
+    /// The last of them is the axis about which it turns if the two are opposite.
+    pub(super) axes: &'a TurnAxes,
     /// Direction of the previous segment; zero at the root.
     pub(super) before: DVec3,
     pub(super) length: f64,
@@ -49,7 +50,7 @@ pub(super) struct Turned {
 /// Blocks of the tree that a segment may meet, with a bit for each triangle.
 pub(super) type Nearby<'t> = Vec<(&'t Block, u16)>;
 
-impl Segment {
+impl Segment<'_> {
     /// Turns by `method`. Afterwards `nearby` holds everything that the segment may cross in its new direction.
     #[inline(always)]
     pub(super) fn turn<'t>(
@@ -79,7 +80,7 @@ impl Segment {
     pub(super) fn sector(&self, from: DVec3, towards: DVec3) -> Sector {
         let axis = from.cross(&towards);
         let sine = axis.norm();
-        let n = if sine > 1e-9 { axis / sine } else { perpendicular(&from, &self.axis) };
+        let n = if sine > 1e-9 { axis / sine } else { perpendicular(&from, &self.axes.last()) };
         Sector {
             pivot: self.pivot,
             u: from,
@@ -108,7 +109,7 @@ impl Segment {
             Stop::Stuck => Sweep::Stuck,
             Stop::Clear => Sweep::Free(Turned { direction: self.to, met: false, clear: true }),
             Stop::None => Sweep::Free(Turned { direction: self.to, met: false, clear: false }),
-            Stop::At(angle) => Sweep::Free(Turned { direction: sector.direction(angle), met: true, clear: false }),
+            Stop::At(direction) => Sweep::Free(Turned { direction, met: true, clear: false }),
         }
     }
 
@@ -137,7 +138,7 @@ impl Segment {
         for step in 1..=steps {
             let direction = if step == steps { self.to } else { sector.direction(at(step)) };
             if self.crosses(&direction, nearby).is_some() {
-                return Stop::At(at(step - 1));
+                return Stop::At(sector.direction(at(step - 1)));
             }
         }
         Stop::None
@@ -155,7 +156,10 @@ impl Segment {
         let crossed = self.crosses(&self.from, nearby);
         // Perpendicular to the surface, all directions out are equally near: the one that bends the curve least is
         // chosen.
-        let outwards = crossed.map_or(self.axis, |crossed| crossed.normal + self.before * STRAIGHT_IN);
+        let outwards = match crossed {
+            Some(crossed) => crossed.normal + self.before * STRAIGHT_IN,
+            None => self.axes.last(),
+        };
         let sector = self.sector(self.from, outwards);
         let (low, high) = sector.bounds(&-sector.u);
         gather(obstacles, low, high, nearby);
@@ -194,7 +198,8 @@ enum Stop {
     Clear,
     /// At the goal.
     None,
-    At(f64),
+    /// In this direction, before something.
+    At(DVec3),
     /// It is blocked at its start.
     Stuck,
 }
@@ -204,26 +209,26 @@ enum Stop {
 fn first_stop(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop {
     let mut until = [sector.u.dot(to), sector.v.dot(to).max(0.0)];
     let mut wedge = Wedge::new(sector, until);
-    let (mut stop, mut clear): (Option<f64>, bool) = (None, true);
+    // The angle of `to` is needed where something is met.
+    let (mut stop, mut whole, mut clear): (Option<f64>, Option<f64>, bool) = (None, None, true);
     for (block, lanes) in nearby {
         let mut lanes = lanes & wedge.may_meet(block);
         clear &= lanes == 0;
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize;
             lanes &= lanes - 1;
-            let mut stuck = false;
-            let mut next = None;
-            sector.blocked_before(until, &corners(block, lane), |blocked| {
-                stuck |= blocked.blocks_start();
-                if blocked.lo > 0.0 {
-                    let angle = (blocked.lo - sector.back / blocked.lo_radius).max(0.0);
-                    next = Some(next.map_or(angle, |least: f64| least.min(angle)));
-                }
-            });
-            if stuck {
+            let found = sector.obstruction(until, &corners(block, lane));
+            if found.at_start {
                 return Stop::Stuck;
             }
-            let Some(next) = next.filter(|next| *next < stop.unwrap_or_else(|| sector.angle_of(to))) else { continue };
+            let Some(next) = found.stop else { continue };
+            let most = match stop {
+                Some(stop) => stop,
+                None => *whole.get_or_insert_with(|| sector.angle_of(to)),
+            };
+            if next >= most {
+                continue;
+            }
             stop = Some(next);
             let (sine, cosine) = libm::sincos(next);
             until = [cosine, sine];
@@ -232,7 +237,8 @@ fn first_stop(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop {
         }
     }
     match stop {
-        Some(angle) => Stop::At(angle),
+        // As `Sector::direction`, whose sine and cosine these are.
+        Some(angle) => Stop::At(if angle == 0.0 { sector.u } else { sector.u * until[0] + sector.v * until[1] }),
         None if clear => Stop::Clear,
         None => Stop::None,
     }
@@ -267,13 +273,6 @@ pub(super) fn first_gap(sector: &Sector, nearby: &Nearby<'_>, most: f64, kept: i
         }
     }
     (angle <= most).then_some(angle)
-}
-
-impl Blocked {
-    /// Whether it contains the angle 0.
-    fn blocks_start(&self) -> bool {
-        (self.lo <= 0.0 && self.hi >= 0.0) || self.hi >= std::f64::consts::TAU
-    }
 }
 
 impl Sector {

@@ -64,7 +64,7 @@ pub(super) fn deform_curves_on(
     DeformedCurves { points, rotations: parallel::concat(rotations), length_error }
 }
 
-kernel! {
+kernel! { avx512
     /// Deforms `curves` into `out`; returns the largest stretch, and rotations if they are wanted.
     fn follow(
         curves: Range<usize>,

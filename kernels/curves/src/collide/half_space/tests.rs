@@ -1,7 +1,8 @@
 //! Turns that a half-space frees, against the sweep through the trees that they save.
 
 use super::super::crossing::first_crossing_in;
-use super::super::{ContactMethod, SkinSurface, perpendicular};
+use super::super::turn_axes::TurnAxes;
+use super::super::{ContactMethod, SkinSurface};
 use super::*;
 use numerics::masked::Masked;
 use numerics::random::Key;
@@ -78,11 +79,13 @@ fn what_a_half_space_frees_the_trees_free_too() {
                 2 => (from + sloping(key.of(6), 0.0) * 1e-9).normalize(),
                 _ => sloping(key.of(6), slope(key.of(7))),
             };
+            let mut axes = TurnAxes::default();
+            axes.push(from);
             let segment = Segment {
                 pivot,
                 from,
                 to,
-                axis: perpendicular(&from, &DVec3::zeros()),
+                axes: &axes,
                 before: DVec3::zeros(),
                 length,
                 half: if case % 4 == 0 { size * number(key.of(8), 0.0, 0.02) } else { 0.0 },
