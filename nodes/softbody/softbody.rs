@@ -23,6 +23,7 @@ mod goals;
 mod joints;
 mod measured;
 mod obstacles;
+mod pace;
 mod pins;
 mod run;
 mod setup;
@@ -71,7 +72,7 @@ params! { PARAMS:
     START_FRAME: Param<i64> = Param::int("start_frame", 1,
         "The frame at which the simulation starts from `bodies`.").unit(Unit::Frame).default_scene_start().fixed();
     GRAVITY: Param<[f32; 3]> = Param::vec3("gravity", [0.0, -9.81, 0.0], "Acceleration due to gravity.")
-        .unit(Unit::MetresPerSecondSquared);
+        .unit(Unit::MetresPerSecondSquared).history();
     DENSITY: Param<Maskable> = Param::maskable("density", 1000.0,
         "Mass per volume. At the same stiffness, denser bodies sag more.")
         .unit(Unit::KilogramsPerCubicMetre).above(0.0).soft(100.0, 3000.0);
@@ -87,7 +88,7 @@ params! { PARAMS:
         .unit(Unit::Seconds).at_least(0.0).soft(0.0, 0.1);
     DRAG: Param<f32> = Param::float("drag", 0.0,
         "Rate at which all motion is slowed, as by thick air: at 1 a body loses 63 % of its speed in a second.")
-        .unit(Unit::PerSecond).at_least(0.0).soft(0.0, 5.0);
+        .unit(Unit::PerSecond).at_least(0.0).soft(0.0, 5.0).history();
     VOLUME: Param<f32> = Param::float("volume", 1.0,
         "Strength of volume preservation and of the resistance to tets turning inside out: at 1 volume stays nearly \
          constant, at 0 there are only springs, and soft bodies crumple.")
@@ -153,7 +154,7 @@ params! { PARAMS:
         .unit(Unit::MetresPerSecond).fixed();
     TIME_SCALE: Param<f32> = Param::float("time_scale", 1.0,
         "Simulated seconds per second of the scene: 0.5 is slow motion, 0 stops time.")
-        .at_least(0.0).soft(0.0, 2.0);
+        .at_least(0.0).soft(0.0, 2.0).history();
 }
 
 const SURFACE: Output = Output::new(
@@ -297,7 +298,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
-    10,
+    11,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
      other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
      pins hold them. `stiffness` has the same effect at any mesh resolution, and the solver is stable for any \
@@ -329,7 +330,9 @@ pub(crate) static NODE: Node = Node::new(
 ])
 .writes(&[&P, &BODY_NUMBER])
 .metrics(METRICS)
-.leaves_out(leaves_out);
+.leaves_out(leaves_out)
+.integrates(|params| params.get(GRAVITY).map(f64::from))
+.integrates(|params| [params.get(DRAG), params.get(TIME_SCALE), 0.0].map(f64::from));
 
 fn couples(params: &Params) -> bool {
     params.get(COUPLING_RADIUS) > 0.0

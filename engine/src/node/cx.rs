@@ -214,6 +214,9 @@ pub(crate) trait History: Sync {
 
     /// The integrand `index` at a frame number.
     fn integrand(&self, index: usize, frame: f64) -> [f64; 3];
+
+    /// Whether params that integrands may read change with time.
+    fn is_animated(&self) -> bool;
 }
 
 /// The context of a node that may read the clock.
@@ -276,6 +279,11 @@ impl FrameCx<'_> {
             Some(history) if N <= declared => std::array::from_fn(|place| history.integrand(place, frame)),
             _ => panic!("it asks for {N} integrands and declares {declared}"),
         }
+    }
+
+    /// Whether a param that integrands may read changes with time, at any frame. If not, integrands have one value.
+    pub fn integrands_vary(&self) -> bool {
+        self.history.is_some_and(History::is_animated)
     }
 
     /// [`Self::integral`] of the node's first `N` integrands.

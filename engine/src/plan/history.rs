@@ -48,6 +48,10 @@ impl History for Integrals<'_> {
     fn integrand(&self, index: usize, frame: f64) -> [f64; 3] {
         self.0[index].value(frame).into()
     }
+
+    fn is_animated(&self) -> bool {
+        self.0.iter().any(|integral| integral.animated)
+    }
 }
 
 struct Integral<'a> {

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::goals::{GoalHistory, Goals};
 use super::measured::measured;
+use super::pace::Pace;
 use super::setup::{MaterialFields, ParticleNumber, SimulationSetup, StartInputs, refusal};
 use super::{
     BODY_COLLISION, BOUNCE, CARRIED_OUTSIDE, COLLIDERS, COUPLING_BREAK, DEEPEST_OVERLAP, DEEPEST_PENETRATION, DRAG,
@@ -20,8 +21,8 @@ use super::{
     IDLE_PINS_WIRE, INITIAL_VELOCITY, INTEGRATOR, KEEP_DENTS, LET_GO, LOST_SHARE, NOT_PUSHED_OUT, PINNED, PINS,
     PLASTIC_CREEP, PLASTIC_WORK, PLASTIC_YIELD, POINTS_INSIDE, RESET_ENERGY, RESET_FRAMES, RESET_TO_GOALS,
     SELF_COLLISION, SEPARATION_FRAMES, START_FRAME, STARTED_IN_BODIES, STARTED_IN_BODIES_OTHER, STARTED_IN_BODIES_WIRE,
-    STARTED_IN_COLLIDERS, STARTED_INSIDE, STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS,
-    TIME_SCALE, TOLERANCE, VOLUME,
+    STARTED_IN_COLLIDERS, STARTED_INSIDE, STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS, TOLERANCE,
+    VOLUME,
 };
 use super::{obstacles, pins};
 
@@ -54,9 +55,10 @@ struct Solving {
 
 /// A step between two frames, or the start, which takes no time.
 #[derive(Clone, Copy)]
-struct Interval {
+struct Interval<'a> {
     frames: [f64; 2],
     seconds: f64,
+    pace: &'a Pace<'a>,
 }
 
 /// What acts on bodies in a step, besides contacts.
@@ -86,13 +88,15 @@ impl Chain for Run {
             setup: OnceLock::from(Arc::new(setup)),
             solving: Some(solving),
         };
-        run.advance(cx, Interval { frames: [cx.frame().number(); 2], seconds: 0.0 })?;
+        let frames = [cx.frame().number(); 2];
+        run.advance(cx, Interval { frames, seconds: 0.0, pace: &Pace::new(cx, frames) })?;
         Ok(run)
     }
 
     fn step(&mut self, cx: &StepCx) -> Result<()> {
         let frames = [cx.previous(), cx.frame()].map(Frame::number);
-        self.advance(cx, Interval { frames, seconds: cx.dt() * f64::from(cx.get(TIME_SCALE)) })
+        let pace = Pace::new(cx, frames);
+        self.advance(cx, Interval { frames, seconds: pace.seconds(cx), pace: &pace })
     }
 
     fn output(&self, cx: &FrameCx) -> Result<Outputs> {
@@ -116,7 +120,7 @@ const NEAR: f64 = 1e-6;
 
 impl Run {
     /// Moves bodies through an interval and sets the metrics; at the start only these.
-    fn advance(&mut self, cx: &FrameCx, interval: Interval) -> Result<()> {
+    fn advance(&mut self, cx: &FrameCx, interval: Interval<'_>) -> Result<()> {
         let setup = self.setup(cx)?;
         let material = MaterialFields::at(cx, &self.inputs)?;
         let mut solving = match self.solving.take() {
@@ -181,7 +185,7 @@ impl Run {
         cx: &'a FrameCx<'_>,
         setup: &'a SimulationSetup,
         history: &'a mut GoalHistory,
-        interval: Interval,
+        interval: Interval<'_>,
     ) -> Result<Influences<'a>> {
         let wired = cx.part(GOALS);
         let mut goals = Goals::of(&self.inputs, setup, &wired, cx.get(START_FRAME) as f64, history)?;
@@ -206,7 +210,7 @@ impl Run {
         solving: &mut Solving,
         influences: &Influences<'_>,
         scene: &CollisionScene<'_>,
-        interval: Interval,
+        interval: Interval<'_>,
     ) -> Result<FrameReport> {
         let touches = scene.ground.is_some()
             || !scene.obstacles.is_empty()
@@ -214,10 +218,12 @@ impl Run {
             || scene.self_contact.is_some();
         let (whole, frames) = (f64::from(cx.get(RESET_TO_GOALS)), cx.get(RESET_FRAMES) as f64);
         let pushed = scene.separation.is_some_and(|apart| !apart.overlaps.is_empty() && apart.over < apart.frames);
+        let ambient = |time: f64| interval.pace.ambient(time);
         let frame = SolverFrame {
             seconds: interval.seconds,
             gravity: cx.get(GRAVITY).map(f64::from),
             drag: f64::from(cx.get(DRAG)),
+            during: if interval.pace.varies { Some(&ambient) } else { None },
             volume: f64::from(cx.get(VOLUME)),
             goals: &influences.pulled,
             pins: &influences.held,
@@ -249,7 +255,7 @@ impl Run {
         setup: &SimulationSetup,
         body: &SoftBody,
         goals: &Goals<'_>,
-        interval: Interval,
+        interval: Interval<'_>,
     ) {
         let now = interval.frames[1];
         let plasticity =

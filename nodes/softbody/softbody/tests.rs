@@ -142,6 +142,40 @@ fn a_body_falls_along_a_parabola() {
     }
 }
 
+/// Within 24 frames: gravity from 0 to g moves a body by g/6, drag from 0 to 4/s leaves e⁻² of its speed, and time from
+/// standing still to its full rate lasts half as long.
+#[test]
+fn keyed_gravity_drag_and_time_act_as_their_integrals() {
+    let last = |bench: Bench| bench.frames([1, 25]).swap_remove(1);
+    let down = [0.0, -9.81, 0.0];
+    let keyed = |substeps: i64| {
+        let falling = simulating(cube()).set(SUBSTEPS, substeps);
+        let thrown = falling.clone().set(GRAVITY, [0.0; 3]).set(INITIAL_VELOCITY, [2.0, 0.0, 0.0]);
+        let fallen = |bench: Bench| f64::from(-last(bench).mesh().positions()[0][1]);
+        let slowed = thrown.keyed(DRAG, &[(1.0, 0.0), (25.0, 4.0)]);
+        let slowed = (2.0 * last(slowed).metrics["kinetic"]).sqrt();
+        [
+            fallen(falling.clone().keyed(GRAVITY, &[(1.0, [0.0; 3]), (25.0, down)])) / (G / 6.0),
+            fallen(falling.keyed(TIME_SCALE, &[(1.0, 0.0), (25.0, 1.0)])) / (G / 8.0),
+            slowed / (2.0 * libm::exp(-2.0)),
+        ]
+    };
+    let (coarse, fine) = (keyed(0), keyed(16));
+    assert!(coarse.iter().all(|share| (share - 1.0).abs() < 1e-3), "{coarse:?}");
+    assert!(fine.iter().all(|share| (share - 1.0).abs() < 1e-5), "{fine:?}");
+}
+
+/// Time comes to a stop as gravity rises in the scene's time: both at once.
+#[test]
+fn gravity_is_that_of_the_scene_s_time_where_time_is_scaled() {
+    let both = simulating(cube()).keyed(TIME_SCALE, &[(1.0, 1.0), (2.0, 0.0)]);
+    let both = both.keyed(GRAVITY, &[(1.0, [0.0; 3]), (2.0, [0.0, -9.81, 0.0])]).set(SUBSTEPS, 64);
+    // With s the share of the frame: dτ = (1 − s) H ds, so v = gH ∫ s (1 − s) ds, and the fall is ∫ v dτ.
+    let exact = G * H * H * (1.0 / 8.0 - 1.0 / 10.0);
+    let fallen = f64::from(-both.frames([2])[0].mesh().positions()[0][1]);
+    assert!((fallen / exact - 1.0).abs() < 2e-3, "{fallen} instead of {exact}");
+}
+
 #[test]
 fn pinned_particles_follow_their_pins_and_the_rest_hangs_from_them() {
     let at = |frame: Frame| {

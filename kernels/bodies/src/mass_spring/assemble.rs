@@ -51,7 +51,7 @@ impl StageSolver {
     #[inline(always)]
     fn own_force(&self, regions: &RankOneTerms, stage: &Stage<'_>, particle: usize, [x, v]: [&[DVec3]; 2]) -> DVec3 {
         let FrameContext { body, external, .. } = stage.context;
-        let mut sum = external.force(particle, body.mass[particle], stage.time, x[particle], v[particle]);
+        let mut sum = external.force(particle, body.mass[particle], &stage.now, x[particle], v[particle]);
         sum -= regions.gather(particle, &self.volumes.pressures, &self.volumes.gradients);
         if let Some(transient_forces) = self.transient_forces.get(particle) {
             sum += transient_forces;
@@ -127,7 +127,7 @@ impl StageSolver {
                     block.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
                 }
                 let mass = body.mass[particle];
-                *inertia = mass + external.inertia(particle, mass, stage.a);
+                *inertia = mass + external.inertia(particle, mass, &stage.now, stage.a);
                 [0, 3, 5].iter().for_each(|diagonal| block[*diagonal] += *inertia);
                 sums.forces[particle - first] = stage.residual(held[particle], particle, x, force);
                 *smooth = if held[particle] { [0.0; 6] } else { smoother(&block) };

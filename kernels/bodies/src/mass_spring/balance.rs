@@ -24,9 +24,10 @@ impl Stepper<'_> {
         let (body, external) = (self.context.body, self.context.external);
         let moved = |particle: usize| motion.x[particle] - start.x[particle];
         let clusters = &body.order.clusters;
+        let [then, now] = times.map(|time| external.at(time));
         let given: f64 = clusters.sum((), |cluster, ()| {
             let of = |particle: usize| {
-                let ends = [times[1], h];
+                let ends = ([&then, &now], h);
                 external.work(particle, body.mass[particle], ends, motion.x[particle], moved(particle))
             };
             clusters.range(cluster).map(of).sum()
@@ -78,7 +79,7 @@ impl Stepper<'_> {
                 }
             }
         }
-        let mut work = 0.0;
+        let (mut work, now) = (0.0, external.at(times[1]));
         for (piece, (mut missing, velocity, sum)) in body.order.pieces.iter().zip(pieces) {
             let particles = body.particles(piece);
             if velocity == DVec3::zeros() || external.held[particles.clone()].contains(&true) {
@@ -87,7 +88,7 @@ impl Stepper<'_> {
             for particle in particles {
                 let mass = body.mass[particle];
                 missing += (end.v[particle] - start.v[particle]) * (mass / h);
-                missing -= external.force(particle, mass, times[1], end.x[particle], end.v[particle]);
+                missing -= external.force(particle, mass, &now, end.x[particle], end.v[particle]);
             }
             work += missing.dot(&velocity) * (h / sum);
         }

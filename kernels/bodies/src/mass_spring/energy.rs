@@ -56,11 +56,12 @@ pub(super) fn measure(
         })
     });
     let clusters = &body.order.clusters;
+    let gravity = context.external.at(time).gravity;
     let own = clusters.sum((), |cluster, ()| {
         clusters.range(cluster).fold(DVec3::zeros(), |sum, particle| {
             let mass = body.mass[particle];
             let goals = mass * context.external.goal_energy(particle, time, x[particle]);
-            let height = -(mass * context.external.gravity.dot(&x[particle]));
+            let height = -(mass * gravity.dot(&x[particle]));
             sum + DVec3::new(0.5 * mass * v[particle].norm_squared(), goals, height)
         })
     });

@@ -71,9 +71,9 @@ impl Stepper<'_> {
         self.context.external.hold(times[1], &mut x, &mut z, h);
         let volumes = self.solver.volumes.at(self.context.body, &z);
         self.solver.set_step_start(&self.context, h, |first, second| distance(&z, first, second), volumes);
-        let scale = self.scale(&start.x, &y, contacts, h);
-        let mut solved = Solved::default();
         let stage = Stage::new(self.context, [&y, &z], h, times[1]);
+        let scale = self.scale(&stage, &start.x, contacts, h);
+        let mut solved = Solved::default();
         for round in 1..=MOST_ROUNDS {
             let again = self.solver.descend(&stage, contacts, scale, &solved, &mut x);
             solved = Solved { residual: again.residual, ..sum(solved, again) };
@@ -94,10 +94,12 @@ impl Stepper<'_> {
         StepEnd { x, v, errors, solved }
     }
 
-    /// Estimate of the squared residual of free motion from `x` to `y` plus gravity and obstacle motion in `h`.
-    fn scale(&self, x: &[DVec3], y: &[DVec3], contacts: &[ContactConstraint], h: f64) -> f64 {
+    /// Estimate of the squared residual of free motion from `x` to that of the stage plus gravity and obstacle motion in
+    /// `h`.
+    fn scale(&self, stage: &Stage<'_>, x: &[DVec3], contacts: &[ContactConstraint], h: f64) -> f64 {
+        let y = stage.y;
         let mass = &self.context.body.mass;
-        let falls = (DVec3::from(self.frame.gravity) * (h * h)).norm_squared();
+        let falls = (stage.now.gravity * (h * h)).norm_squared();
         let own: f64 =
             (0..x.len()).map(|particle| mass[particle] * (falls + (y[particle] - x[particle]).norm_squared())).sum();
         let given = contacts.iter().flat_map(|contact| {

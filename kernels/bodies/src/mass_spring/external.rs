@@ -1,6 +1,7 @@
 //! External forces and constraints: gravity, drag, goals, pins.
 //!
-//! All are evaluated at the time of each stage; goals and pins move linearly through the frame.
+//! All are evaluated at the time of each stage: gravity and drag as the caller gives them for that time, while goals and
+//! pins move linearly through the frame.
 
 use super::body::SoftBody;
 use super::frame::SolverFrame;
@@ -28,11 +29,31 @@ pub struct Pin {
     pub between: [[f64; 3]; 2],
 }
 
-/// External forces of one frame, in the solver's order.
-#[derive(Clone, Debug)]
-pub(super) struct ExternalForces {
+/// What acts on all particles alike.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ambient {
+    /// Acceleration by gravity, m/s².
+    pub gravity: [f64; 3],
+    /// Damping of all motion, 1/s.
+    pub drag: f64,
+}
+
+/// [`Ambient`] at a time.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moment {
+    /// A fraction of the frame.
+    time: f64,
     pub(super) gravity: DVec3,
-    pub(super) drag: f64,
+    drag: f64,
+}
+
+/// External forces of one frame, in the solver's order.
+#[derive(Clone)]
+pub(super) struct ExternalForces<'a> {
+    /// Gravity and drag at the end of the frame.
+    at_end: Ambient,
+    /// The same at a fraction of the frame, if they vary within it.
+    during: Option<&'a (dyn Fn(f64) -> Ambient + Sync)>,
     /// Length of the frame, seconds.
     seconds: f64,
     /// The goal of each particle; empty without goals.
@@ -49,12 +70,12 @@ struct Track {
     damping: f64,
 }
 
-impl ExternalForces {
-    pub(super) fn new(body: &SoftBody, frame: &SolverFrame<'_>, seconds: f64) -> Self {
-        let SolverFrame { goals, pins, .. } = *frame;
+impl<'a> ExternalForces<'a> {
+    pub(super) fn new(body: &SoftBody, frame: &SolverFrame<'a>, seconds: f64) -> Self {
+        let SolverFrame { goals, pins, gravity, drag, during, .. } = *frame;
         let mut external = Self {
-            gravity: frame.gravity.into(),
-            drag: frame.drag.max(0.0),
+            at_end: Ambient { gravity, drag },
+            during,
             seconds,
             goals: if goals.is_empty() { Vec::new() } else { vec![None; body.len()] },
             held: vec![false; body.len()],
@@ -81,10 +102,20 @@ impl ExternalForces {
         external
     }
 
-    /// Whether a goal or pin moves, so that it can do work.
-    pub(super) fn moves(&self) -> bool {
+    /// Gravity and drag at `time`, a fraction of the frame.
+    pub(super) fn at(&self, time: f64) -> Moment {
+        let Ambient { gravity, drag } = self.during.map_or(self.at_end, |during| during(time));
+        Moment { time, gravity: gravity.into(), drag: drag.max(0.0) }
+    }
+
+    /// Whether gravity changes or a goal or pin moves between two `times`, fractions of the frame, so that it can do work
+    /// that is not in the energies.
+    pub(super) fn drives(&self, times: [f64; 2]) -> bool {
         let moves = |between: &[DVec3; 2]| between[0] != between[1];
-        self.pins.iter().any(|pin| moves(&pin.1)) || self.goals.iter().flatten().any(|goal| moves(&goal.between))
+        let [before, after] = times.map(|time| self.at(time).gravity);
+        before != after
+            || self.pins.iter().any(|pin| moves(&pin.1))
+            || self.goals.iter().flatten().any(|goal| moves(&goal.between))
     }
 
     /// Moves pinned particles to their positions at `time`, a fraction of the frame, and sets `z` so that (x − z)/a
@@ -99,10 +130,10 @@ impl ExternalForces {
 
     /// External force on a particle, newtons.
     #[inline(always)]
-    pub(super) fn force(&self, particle: usize, mass: f64, time: f64, x: DVec3, v: DVec3) -> DVec3 {
-        let mut sum = self.gravity - v * self.drag;
+    pub(super) fn force(&self, particle: usize, mass: f64, now: &Moment, x: DVec3, v: DVec3) -> DVec3 {
+        let mut sum = now.gravity - v * now.drag;
         if let Some(goal) = self.goal(particle) {
-            sum += (lerp(&goal.between, time) - x) * goal.strength;
+            sum += (lerp(&goal.between, now.time) - x) * goal.strength;
             sum += (self.velocity(&goal.between) - v) * goal.damping;
         }
         sum * mass
@@ -110,8 +141,8 @@ impl ExternalForces {
 
     /// Its contribution to the diagonal of the system in a stage of `a`, kilograms.
     #[inline(always)]
-    pub(super) fn inertia(&self, particle: usize, mass: f64, a: f64) -> f64 {
-        let mut sum = a * self.drag;
+    pub(super) fn inertia(&self, particle: usize, mass: f64, now: &Moment, a: f64) -> f64 {
+        let mut sum = a * now.drag;
         if let Some(goal) = self.goal(particle) {
             sum += a * a * goal.strength + a * goal.damping;
         }
@@ -120,9 +151,9 @@ impl ExternalForces {
 
     /// Potential of [`ExternalForces::force`] in a stage in which `v` = (x − z)/a; with `a` = 0 the stored energy,
     /// joules.
-    pub(super) fn energy(&self, particle: usize, mass: f64, time: f64, a: f64, x: DVec3, v: DVec3) -> f64 {
-        let mut sum = -self.gravity.dot(&x) + 0.5 * a * self.drag * v.norm_squared();
-        sum += self.goal_energy(particle, time, x);
+    pub(super) fn energy(&self, particle: usize, mass: f64, now: &Moment, a: f64, x: DVec3, v: DVec3) -> f64 {
+        let mut sum = -now.gravity.dot(&x) + 0.5 * a * now.drag * v.norm_squared();
+        sum += self.goal_energy(particle, now.time, x);
         if let Some(goal) = self.goal(particle) {
             sum += 0.5 * a * goal.damping * (self.velocity(&goal.between) - v).norm_squared();
         }
@@ -134,13 +165,15 @@ impl ExternalForces {
         self.goal(particle).map_or(0.0, |goal| 0.5 * goal.strength * (lerp(&goal.between, time) - x).norm_squared())
     }
 
-    /// Work on a particle that moved by `dx` to `x` in a step of `h` seconds that ended at `time`: that of drag, of a
-    /// goal's dashpot and of a goal's motion. Gravity and springs of goals have potentials instead. Joules.
-    pub(super) fn work(&self, particle: usize, mass: f64, [time, h]: [f64; 2], x: DVec3, dx: DVec3) -> f64 {
-        let mut sum = -self.drag * dx.norm_squared() / h;
+    /// Work on a particle that moved by `dx` to `x` in a step of `h` seconds between two moments: that of drag, of changes
+    /// of gravity (half-way), of a goal's dashpot and of a goal's motion. Gravity and springs of goals have potentials
+    /// besides. Joules.
+    pub(super) fn work(&self, particle: usize, mass: f64, step: ([&Moment; 2], f64), x: DVec3, dx: DVec3) -> f64 {
+        let ([before, now], h) = step;
+        let mut sum = -now.drag * dx.norm_squared() / h - (now.gravity - before.gravity).dot(&(x - dx * 0.5));
         if let Some(goal) = self.goal(particle) {
             let moved = self.velocity(&goal.between) * h;
-            sum += goal.strength * (lerp(&goal.between, time) - x).dot(&moved);
+            sum += goal.strength * (lerp(&goal.between, now.time) - x).dot(&moved);
             sum += goal.damping * (moved - dx).dot(&dx) / h;
         }
         sum * mass

@@ -3,7 +3,7 @@
 use super::body::SoftBody;
 use super::contact::ContactFinder;
 use super::energy::{Energies, measure, worst_stretch};
-use super::external::{ExternalForces, GoalSpring, Pin};
+use super::external::{Ambient, ExternalForces, GoalSpring, Pin};
 use super::springs::{self, RestLengths};
 use super::stage::{FrameContext, StageSolver};
 use super::state::State;
@@ -33,10 +33,12 @@ pub enum Integrator {
 pub struct SolverFrame<'a> {
     /// Length of the frame, seconds; 0 does nothing.
     pub seconds: f64,
-    /// Acceleration by gravity, m/s².
+    /// Acceleration by gravity at the end of the frame, m/s².
     pub gravity: [f64; 3],
-    /// Damping of all motion, 1/s.
+    /// Damping of all motion at the end of the frame, 1/s.
     pub drag: f64,
+    /// Gravity and drag at a fraction of the frame, where they vary within it; `None`: they are constant.
+    pub during: Option<&'a (dyn Fn(f64) -> Ambient + Sync)>,
     /// Strength of volume preservation, 0…1.
     pub volume: f64,
     /// Soft targets for particles.
@@ -65,6 +67,7 @@ impl Default for SolverFrame<'_> {
             seconds: 1.0 / 24.0,
             gravity: [0.0, -9.81, 0.0],
             drag: 0.0,
+            during: None,
             volume: 1.0,
             goals: &[],
             pins: &[],
@@ -206,7 +209,8 @@ impl BodySolver {
         (report.kinetic, report.elastic) = (after.kinetic, after.springs);
         (report.volume_energy, report.goal_energy) = (after.volumes, after.goals);
         report.worst_stretch = worst_stretch(&context, &motion.x);
-        report.lost_share = lost_share(report.energy_lost, [&before, &after], body, external.gravity.norm() * seconds);
+        report.lost_share =
+            lost_share(report.energy_lost, [&before, &after], body, external.at(1.0).gravity.norm() * seconds);
         (state.cached, state.carried) = (std::mem::take(&mut self.solver.cached), motion.carried);
         state.loads.clear();
         state.loads.extend(body.contact_indices().map(|point| motion.loads[point]));

@@ -45,7 +45,7 @@ mod volume;
 
 pub use body::{BodyError, BodySpring, LIGHTEST, Material, Mesh, SHORTEST, SoftBody};
 pub use contact::{Contact, ContactFinder, ContactQuery};
-pub use external::{GoalSpring, Pin};
+pub use external::{Ambient, GoalSpring, Pin};
 pub use frame::{BodySolver, FrameReport, Integrator, SolverFrame};
 pub use plastic::{Plasticity, flow, reset, tear};
 pub use state::State;

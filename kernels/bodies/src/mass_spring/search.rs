@@ -171,7 +171,7 @@ impl StageSolver {
                     return sum + DVec2::new(springs, 0.0);
                 }
                 let mass = body.mass[particle];
-                let energy = external.energy(particle, mass, stage.time, a, x[particle], v[particle]);
+                let energy = external.energy(particle, mass, &stage.now, a, x[particle], v[particle]);
                 let inertial = 0.5 * mass * (x[particle] - stage.y[particle]).norm_squared();
                 DVec2::new(sum.x + springs + energy, sum.y + inertial)
             })

@@ -9,7 +9,7 @@ use super::body::SoftBody;
 use super::coarse::{self, ClusterMotions, ContactFilters, Layout};
 use super::conjugate_gradients::{Coarse, Limits, Reached};
 use super::contact::{ContactConstraint, ContactState};
-use super::external::ExternalForces;
+use super::external::{ExternalForces, Moment};
 use super::galerkin::Galerkin;
 use super::springs::{self, Link, Record, RestLengths};
 use super::state::CachedCoarseFactor;
@@ -48,8 +48,8 @@ pub(super) struct Stage<'a> {
     pub(super) z: &'a [DVec3],
     /// Step coefficient, seconds.
     pub(super) a: f64,
-    /// Time at its end, as a fraction of the frame.
-    pub(super) time: f64,
+    /// Its end.
+    pub(super) now: Moment,
     pub(super) contacts: &'a [ContactConstraint],
     /// Seconds from that time to the one that contacts were detected for.
     pub(super) early: f64,
@@ -62,9 +62,11 @@ pub(super) struct Stage<'a> {
 }
 
 impl<'a> Stage<'a> {
-    /// The stage of a line search that ends at `time` with step coefficient `a`, with neither contacts nor a bound on noise.
+    /// The stage of a line search that ends at `time`, a fraction of the frame, with step coefficient `a`, with neither
+    /// contacts nor a bound on noise.
     pub(super) fn new(context: FrameContext<'a>, [y, z]: [&'a [DVec3]; 2], a: f64, time: f64) -> Self {
-        Self { context, y, z, a, time, contacts: &[], early: 0.0, rotational_energy: &[], line_search: true, index: 0 }
+        let now = context.external.at(time);
+        Self { context, y, z, a, now, contacts: &[], early: 0.0, rotational_energy: &[], line_search: true, index: 0 }
     }
 
     /// a²f − M(x − y) of a particle at `x` on which a `force` acts; 0 if it is `held`.
@@ -79,7 +81,7 @@ impl<'a> Stage<'a> {
 #[derive(Clone, Copy)]
 pub(super) struct FrameContext<'a> {
     pub(super) body: &'a SoftBody,
-    pub(super) external: &'a ExternalForces,
+    pub(super) external: &'a ExternalForces<'a>,
     pub(super) rest: RestLengths<'a>,
     /// Current rest volumes of tetrahedra.
     pub(super) volumes: &'a [f64],

@@ -138,7 +138,7 @@ impl Stepper<'_> {
             Some(energies) => energies,
             None => measure(self.solver, &self.context, times[1], [&motion.x, &motion.v], false),
         };
-        if self.undriven() {
+        if self.undriven(times) {
             self.remove_energy_gain(before, &mut motion, &mut stepped);
         } else {
             motion.carried.energy_budget = 0.0;
@@ -165,7 +165,7 @@ impl Stepper<'_> {
             Ok(mut end) => {
                 let energies = measure(self.solver, &self.context, times[1], [&end.x, &end.v], true);
                 let gain = energies.sum() - before.sum();
-                gained = self.undriven() && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
+                gained = self.undriven(times) && gain > GAIN * before.scale().max(energies.kinetic - before.kinetic);
                 active_set_unchanged = frozen.iter().all(|contact| contact.active_set_unchanged(&end.x, &end.v));
                 if active_set_unchanged {
                     let (found, missed) = self.find_missed(contacts, step, &end.x);
@@ -192,10 +192,11 @@ impl Stepper<'_> {
         self.solver.inventory = seen.unwrap_or_else(|| Inventory::new(self.context.body, x, self.context.volumes));
     }
 
-    /// Whether nothing external but gravity and resting goals did work in the step: contacts may be near, but not
-    /// closed.
-    fn undriven(&self) -> bool {
-        !self.context.external.moves() && self.solver.contact_states.iter().all(|state| state.mode == ContactMode::Open)
+    /// Whether nothing external but constant gravity and resting goals did work in the step between two `times`: contacts
+    /// may be near, but not closed.
+    fn undriven(&self, times: [f64; 2]) -> bool {
+        !self.context.external.drives(times)
+            && self.solver.contact_states.iter().all(|state| state.mode == ContactMode::Open)
     }
 
     /// Stops particles whose result is not finite where they were.

@@ -58,3 +58,37 @@ fn the_piece_that_carries_its_weight_worst_gives_the_ratio_of_stiffness_to_weigh
     }
     assert_eq!(body.stiffness_to_weight([0.0; 3]), f64::INFINITY);
 }
+
+/// Gravity from 0 to g within a frame of a second, and drag from 0 to 4/s: a body falls by g/6, and a thrown one keeps
+/// e⁻² of its speed.
+#[test]
+fn gravity_and_drag_that_change_within_a_frame_act_as_their_integrals() {
+    let body = block_body([2, 2, 2], 0.1, &material(1e3, 1e4, 0.01));
+    let errors = |integrator, substeps| -> [f64; 2] {
+        let falls = |time: f64| Ambient { gravity: [0.0, -9.81 * time, 0.0], drag: 0.0 };
+        let slows = |time: f64| Ambient { gravity: [0.0; 3], drag: 4.0 * time };
+        let frame = SolverFrame { seconds: 1.0, integrator, substeps, ..BARE };
+        let start = State::at_rest(&body);
+        let mut state = start.clone();
+        let falling = SolverFrame { gravity: [0.0, -9.81, 0.0], during: Some(&falls), ..frame };
+        let report = steps(&body, &mut state, &falling, 1);
+        if integrator == Integrator::Default && substeps >= 16 {
+            let lost = report.energy_lost / report.kinetic;
+            assert!(lost.abs() < 2.0 / f64::from(substeps * substeps), "{lost} of the energy lost");
+        }
+        let fallen = start.positions[3][1] - state.positions[3][1];
+        let mut state = start;
+        state.velocities.fill([2.0, 0.0, 0.0]);
+        let _ = steps(&body, &mut state, &SolverFrame { drag: 4.0, during: Some(&slows), ..frame }, 1);
+        [fallen / (9.81 / 6.0) - 1.0, 0.5 * state.velocities[3][0] / libm::exp(-2.0) - 1.0].map(f64::abs)
+    };
+    for (integrator, order) in [(Integrator::Default, 1.8..2.3), (Integrator::Euler, 0.8..1.2)] {
+        let found = [16, 64, 256].map(|substeps| errors(integrator, substeps));
+        for what in [0, 1] {
+            let orders = [0, 1].map(|k| libm::log2(found[k][what] / found[k + 1][what]) / 2.0);
+            assert!(orders.iter().all(|found| order.contains(found)), "{integrator:?}: orders {orders:?} of {found:?}");
+        }
+    }
+    let found = errors(Integrator::Accurate { tolerance: 1e-5 }, 0);
+    assert!(found.iter().all(|error| *error < 1e-3), "{found:?}");
+}

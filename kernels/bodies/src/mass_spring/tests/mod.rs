@@ -19,6 +19,7 @@ const BARE: SolverFrame<'static> = SolverFrame {
     seconds: 1.0 / 24.0,
     gravity: [0.0; 3],
     drag: 0.0,
+    during: None,
     volume: 0.0,
     goals: &[],
     pins: &[],
