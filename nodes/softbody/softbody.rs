@@ -290,6 +290,16 @@ metrics! { METRICS:
         "Points of the mesh that rides along that are outside the tets by more than the size of a tet.")
         .warn_above(0.0, "The mesh that rides along reaches far out of the tets, which stretch it there beyond what the body \
             does. Give `carry` of Tetrahedralize a mesh that lies within its surface, or the surface the shape of that mesh.");
+    STIFFEST_DIRECTION = Metric::new("stiffest_direction", Unit::None,
+        "Resistance of the springs to even stretching in the direction in which they resist most, relative to `stiffness`; of \
+         the body for which that is largest. About 1 for tets that are as wide as long; long tets are stiffer along their \
+         length. 0 if no body has a volume.")
+        .warn_above(1.7, "{bodies:stiffest_direction_wire} has long tets, which make it stiffer along their length than \
+            `stiffness` says, by about the factor `stiffest_direction`. Give its surface faces that are as long as wide, use \
+            `method` `cage` of Tetrahedralize, or lower `stiffness`.");
+    STIFFEST_DIRECTION_WIRE = Metric::new("stiffest_direction_wire", Unit::None, "The wire of that body, from 0; −1 if there is none.");
+    SOFTEST_DIRECTION = Metric::new("softest_direction", Unit::None,
+        "The same in the direction in which they resist least, of the body for which that is smallest.");
     PINNED = Metric::new("pinned", Unit::None,
         "Particles held or pulled by pins. If it is 0, no particle was within a pin's `radius` at the start.");
     TORN = Metric::new("torn", Unit::None, "Coupling springs torn since the start.");
@@ -301,8 +311,8 @@ pub(crate) static NODE: Node = Node::new(
     11,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
      other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
-     pins hold them. `stiffness` has the same effect at any mesh resolution, and the solver is stable for any \
-     stiffness, mass and initial state.",
+     pins hold them. `stiffness` has the same effect at any mesh resolution as long as tets are about as wide as long \
+     (`stiffest_direction`), and the solver is stable for any stiffness, mass and initial state.",
     Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),
 )
 .inputs(INPUTS)

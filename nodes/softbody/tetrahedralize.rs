@@ -50,7 +50,8 @@ choice! {
 inputs! { INPUTS:
     SURFACE: Input = Input::one("surface", Kind::Mesh,
         "Closed surfaces, one per body. A surface within another one is the wall of a cavity, and one within a cavity is \
-         a body again. Coarse faces make a coarse body. With `method` `cage`, any mesh: regions with a winding \
+         a body again. Coarse faces make a coarse body; \
+         faces much longer than wide make one that Softbody finds stiffer along them. With `method` `cage`, any mesh: regions with a winding \
          number of a half or more, or −½ or less, are inside (the wall of a cavity must face into the cavity), holes count as closed, and sheets become \
          one tet thick.");
     CARRY: Input<Opt> = Input::optional("carry", Kind::Mesh,

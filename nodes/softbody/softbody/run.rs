@@ -20,9 +20,9 @@ use super::{
     FRICTION, GOAL_DISTANCE, GOAL_ON, GOALS, GRAVITY, GROUND, GROUND_HEIGHT, IDLE_PINS, IDLE_PINS_POINT,
     IDLE_PINS_WIRE, INITIAL_VELOCITY, INTEGRATOR, KEEP_DENTS, LET_GO, LOST_SHARE, NOT_PUSHED_OUT, PINNED, PINS,
     PLASTIC_CREEP, PLASTIC_WORK, PLASTIC_YIELD, POINTS_INSIDE, RESET_ENERGY, RESET_FRAMES, RESET_TO_GOALS,
-    SELF_COLLISION, SEPARATION_FRAMES, START_FRAME, STARTED_IN_BODIES, STARTED_IN_BODIES_OTHER, STARTED_IN_BODIES_WIRE,
-    STARTED_IN_COLLIDERS, STARTED_INSIDE, STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS, TOLERANCE,
-    VOLUME,
+    SELF_COLLISION, SEPARATION_FRAMES, SOFTEST_DIRECTION, START_FRAME, STARTED_IN_BODIES, STARTED_IN_BODIES_OTHER,
+    STARTED_IN_BODIES_WIRE, STARTED_IN_COLLIDERS, STARTED_INSIDE, STIFFEST_DIRECTION, STIFFEST_DIRECTION_WIRE,
+    STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS, TOLERANCE, VOLUME,
 };
 use super::{obstacles, pins};
 
@@ -139,6 +139,7 @@ impl Run {
             self.metrics.set(STARTED_INSIDE, inside as f64);
             set_overlaps(&setup, &overlaps, &mut self.metrics);
             self.metrics.set(CARRIED_OUTSIDE, setup.carried_outside() as f64);
+            set_evenness(&setup, &solving.body, &mut self.metrics);
             self.overlaps = overlaps;
         }
         let mut overlaps = std::mem::take(&mut self.overlaps);
@@ -306,14 +307,28 @@ impl Run {
 }
 
 /// Metrics of the start that later frames publish, too.
-const AT_START: [Metric; 6] = [
+const AT_START: [Metric; 9] = [
     STARTED_INSIDE,
     STARTED_IN_BODIES,
     STARTED_IN_BODIES_WIRE,
     STARTED_IN_BODIES_OTHER,
     STARTED_IN_COLLIDERS,
     CARRIED_OUTSIDE,
+    STIFFEST_DIRECTION,
+    STIFFEST_DIRECTION_WIRE,
+    SOFTEST_DIRECTION,
 ];
+
+/// Sets the metrics of how evenly bodies resist in all directions.
+fn set_evenness(setup: &SimulationSetup, body: &SoftBody, metrics: &mut MetricValues) {
+    let moduli = body.directional_moduli();
+    let stiffest = moduli.iter().rev().max_by(|a, b| a.range[1].total_cmp(&b.range[1]));
+    let wire = stiffest.and_then(|stiffest| setup.wire_of_particle(stiffest.particle as usize));
+    let softest = moduli.iter().map(|modulus| modulus.range[0]).reduce(f64::min);
+    metrics.set(STIFFEST_DIRECTION, stiffest.map_or(0.0, |stiffest| stiffest.range[1]));
+    metrics.set(STIFFEST_DIRECTION_WIRE, wire.map_or(-1.0, |wire| wire as f64));
+    metrics.set(SOFTEST_DIRECTION, softest.unwrap_or(0.0));
+}
 
 /// Sets the metrics of what is inside something at the start.
 fn set_overlaps(setup: &SimulationSetup, overlaps: &[Overlap], metrics: &mut MetricValues) {

@@ -239,7 +239,12 @@ impl SimulationSetup {
         let first = *self.skins[skin].points().first()? as usize;
         let carrier = first.checked_sub(self.rest.len()).map(|point| &self.riding[point]);
         let first = carrier.and_then(|carrier| carrier.sides().next()).map_or(first, |side| side.0 as usize);
-        self.wires.iter().position(|wire| wire.contains(&first))
+        self.wire_of_particle(first)
+    }
+
+    /// The wire that a particle came through.
+    pub(super) fn wire_of_particle(&self, particle: usize) -> Option<usize> {
+        self.wires.iter().position(|wire| wire.contains(&particle))
     }
 
     /// The body that the solver works on.

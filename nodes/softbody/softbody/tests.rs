@@ -176,6 +176,23 @@ fn gravity_is_that_of_the_scene_s_time_where_time_is_scaled() {
     assert!((fallen / exact - 1.0).abs() < 2e-3, "{fallen} instead of {exact}");
 }
 
+/// Cubes cut around their diagonals, and a regular tet stretched to twice its height, whose springs have the modulus
+/// C₃₃ − 2C₁₃²/(C₁₁ + C₁₂) along it, from products of the directions of its edges.
+#[test]
+fn bodies_of_long_tets_are_told_from_even_ones() {
+    let long = [[1.0, 1.0, 2.0], [1.0, -1.0, -2.0], [-1.0, 1.0, -2.0], [-1.0, -1.0, 2.0]];
+    let long = Component::tets(vec![[0, 1, 2, 3]], long.map(|[x, y, z]| [0.1 * x + 1.0, 0.1 * y, 0.1 * z]).to_vec());
+    let of = |bench: Bench| {
+        let metrics = bench.frames([1, 2]).pop().unwrap().metrics;
+        ["stiffest_direction", "stiffest_direction_wire", "softest_direction"].map(|metric| metrics[metric])
+    };
+    let even = of(simulating(cube()));
+    assert!(even[0] < 1.7 && even[1] == 0.0 && even[2] > 0.3, "{even:?}");
+    let both = of(simulating(cube()).input(BODIES, long.unwrap()));
+    let exact = 4.0 * 16.0 / 25.0 - 2.0 * 64.0 / 625.0 / 1.08;
+    assert!((both[0] / exact - 1.0).abs() < 1e-6 && both[1] == 1.0 && both[2] <= even[2], "{both:?}, not {exact}");
+}
+
 #[test]
 fn pinned_particles_follow_their_pins_and_the_rest_hangs_from_them() {
     let at = |frame: Frame| {

@@ -136,7 +136,7 @@ pub struct SoftBody {
     /// Tetrahedra in fixed parts.
     pub(super) tet_partition: Partition,
     /// All tetrahedra of the mesh by the caller's indices, with their six springs and unsigned volumes.
-    given: Vec<MeshTet>,
+    pub(super) given: Vec<MeshTet>,
     /// Index in the mesh of each of `tets`.
     kept: Vec<u32>,
     /// Number of springs that come from the mesh; explicit ones follow.
@@ -152,12 +152,19 @@ pub struct SoftBody {
 }
 
 #[derive(Clone, Debug)]
-struct MeshTet {
-    corners: [u32; 4],
+pub(super) struct MeshTet {
+    pub(super) corners: [u32; 4],
     springs: [u32; 6],
     volume: f64,
     /// The share of the volume that is filled with material.
     fill: f64,
+}
+
+impl MeshTet {
+    /// Volume of the material in it, m³.
+    pub(super) fn filled(&self) -> f64 {
+        self.volume * self.fill
+    }
 }
 
 impl SoftBody {
@@ -304,18 +311,11 @@ impl SoftBody {
     pub fn set_material(&mut self, material: &Material<'_>) -> Result<(), BodyError> {
         let mut masses = vec![0.0; self.len()];
         let mesh_spring_count = self.mesh_spring_count;
-        let mut stored = vec![0.0; mesh_spring_count];
         for tet in &self.given {
-            let filled = tet.volume * tet.fill;
-            let quarter = 0.25 * filled * mean_over(&material.density, tet.corners);
-            let energy = filled * mean_over(&material.stiffness, tet.corners);
+            let quarter = 0.25 * tet.filled() * mean_over(&material.density, tet.corners);
             tet.corners.iter().for_each(|corner| masses[*corner as usize] += quarter);
-            tet.springs.iter().for_each(|spring| stored[*spring as usize] += energy);
         }
-        let first = mesh_spring_count - self.means.len();
-        for (spring, near) in (first..).zip(&self.means) {
-            stored[spring] = near.iter().map(|edge| stored[*edge as usize]).sum::<f64>() / near.len().max(1) as f64;
-        }
+        let stored = self.spread(|tet| tet.filled() * mean_over(&material.stiffness, tet.corners));
         let shortest = SHORTEST * mean(&self.lengths[..mesh_spring_count]);
         for spring in 0..mesh_spring_count {
             let length = self.lengths[spring].max(shortest);
@@ -330,6 +330,21 @@ impl SoftBody {
         let damping: Vec<f64> = self.kept.iter().map(|tet| mean_over(&material.damping, corners(tet))).collect();
         self.regions.set_material(&self.volumes, &self.moduli, &damping);
         self.set_masses(&masses)
+    }
+
+    /// For each spring of the mesh the sum of `energy`, E·V, over its tetrahedra, joules; for missing edges the mean of the
+    /// surface edges at their ends.
+    pub(super) fn spread(&self, energy: impl Fn(&MeshTet) -> f64) -> Vec<f64> {
+        let mut sums = vec![0.0; self.mesh_spring_count];
+        for tet in &self.given {
+            let energy = energy(tet);
+            tet.springs.iter().for_each(|spring| sums[*spring as usize] += energy);
+        }
+        let first = self.mesh_spring_count - self.means.len();
+        for (spring, near) in (first..).zip(&self.means) {
+            sums[spring] = near.iter().map(|edge| sums[*edge as usize]).sum::<f64>() / near.len().max(1) as f64;
+        }
+        sums
     }
 
     fn set_masses(&mut self, masses: &[f64]) -> Result<(), BodyError> {

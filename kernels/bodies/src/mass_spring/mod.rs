@@ -24,6 +24,7 @@ mod conjugate_gradients;
 mod contact;
 mod energy;
 mod euler;
+mod evenness;
 mod external;
 mod frame;
 mod friction;
@@ -45,6 +46,7 @@ mod volume;
 
 pub use body::{BodyError, BodySpring, LIGHTEST, Material, Mesh, SHORTEST, SoftBody};
 pub use contact::{Contact, ContactFinder, ContactQuery};
+pub use evenness::DirectionalModulus;
 pub use external::{Ambient, GoalSpring, Pin};
 pub use frame::{BodySolver, FrameReport, Integrator, SolverFrame};
 pub use plastic::{Plasticity, flow, reset, tear};
