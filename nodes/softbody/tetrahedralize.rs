@@ -31,9 +31,11 @@ choice! {
     /// How the tets are made.
     enum Method {
         Delaunay = "delaunay": "Delaunay tets between the points of the surface and inner points. The surface must be \
-                    closed and must not cross itself; it is the surface of the tets",
+                    closed and must not cross itself. Its points are points of the tets, and where it is fine \
+                    enough its faces are faces of tets (`missing_faces`)",
         Cage = "cage": "the tets of a regular lattice around and inside any surface: open, crossing itself, with several \
-                faces at an edge. The surface rides along in them. Parts closer together than `spacing` are joined",
+                faces at an edge. The surface rides along in them. Parts closer together than \
+                `spacing` are joined; those up to 2.2 times as far apart may be, depending on how they lie in the lattice",
     }
 }
 
@@ -95,7 +97,8 @@ metrics! { METRICS:
             surface. Use smaller and more even faces where the surface is thin or has long faces, or a smaller \
             `spacing`.");
     MISSING_FACES = Metric::new("missing_faces", Unit::None,
-        "Faces of the surface that are not faces of tets: there the tets cut a corner or bulge.");
+        "Faces of the surface that are not faces of tets. Where two triangles form a flat quad that the tets cut along its \
+         other diagonal, this changes no shape; elsewhere the tets cut a corner or bulge (`volume_error`).");
     MISSING_EDGES = Metric::new("missing_edges", Unit::None, "Edges of the surface that are not edges of tets.");
     BARE_POINTS = Metric::new("bare_points", Unit::None, "Points of the surface that belong to no tet.")
         .warn_above(0.0,

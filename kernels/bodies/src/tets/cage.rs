@@ -4,8 +4,9 @@
 //! ([`super::solid_angle`]). Every point that a face uses lies in one of them, so a mesh can ride along, bound by
 //! barycentric weights ([`crate::embedding`]). All tets are congruent, with dihedral angles of 60° and 90°.
 //!
-//! Limits: the cage reaches up to a tet beyond the surface, and parts closer together than that are joined. So that a
-//! body keeps its mass and stiffness nevertheless, [`Cage::fill`] says how much of each tet is inside.
+//! Limits: the cage reaches up to a tet beyond the surface, so parts closer together than two tets may be joined, as they
+//! are where tets on both sides of a gap share a point. So that a body keeps its mass and stiffness nevertheless,
+//! [`Cage::fill`] says how much of each tet is inside.
 
 use numerics::parallel;
 use numerics::tree::TriangleTree;

@@ -155,6 +155,22 @@ fn separate_pieces_are_separate_bodies() {
     }
 }
 
+/// Tets have edges of up to 1.083 `spacing`, and those of both parts are joined if they share a point: never where
+/// the gap is wider than two, and here always where it is as wide as one.
+#[test]
+fn parts_are_joined_across_one_spacing_and_never_across_more_than_two_tets() {
+    let spacing = 0.1;
+    for k in 0..12 {
+        let other = [0.2 + 0.031 * k as f32, 0.3, 0.25 + 0.017 * k as f32];
+        let bodies = |gap: f64| {
+            let gap = (gap * spacing) as f32;
+            let two = joined(&[block([0.3, 0.4, 0.3], [-0.3, 0.0, 0.0]), block(other, [gap, 0.0, 0.0])]);
+            cage(&two, spacing).bodies
+        };
+        assert_eq!([1.0, 2.17].map(bodies), [1, 2], "{k}");
+    }
+}
+
 #[test]
 fn a_box_without_a_bottom_counts_as_closed_near_its_rim() {
     let cage = cage(&open_box(10), 0.07);
