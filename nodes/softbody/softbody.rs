@@ -295,7 +295,7 @@ metrics! { METRICS:
          the body for which that is largest. About 1 for tets that are as wide as long; long tets are stiffer along their \
          length. 0 if no body has a volume.")
         .warn_above(1.7, "{bodies:stiffest_direction_wire} has long tets, which make it stiffer along their length than \
-            `stiffness` says, about as many times as `stiffest_direction`. Give its surface faces that are as long as wide, use \
+            `stiffness` says, by about the factor `stiffest_direction`. Give its surface faces that are as long as wide, use \
             `method` `cage` of Tetrahedralize, or lower `stiffness`.");
     STIFFEST_DIRECTION_WIRE = Metric::new("stiffest_direction_wire", Unit::None, "The wire of that body, from 0; −1 if there is none.");
     SOFTEST_DIRECTION = Metric::new("softest_direction", Unit::None,
