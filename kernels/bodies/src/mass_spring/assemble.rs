@@ -1,9 +1,9 @@
 //! Forces, residual and linear system of a stage at given positions.
 
-use super::contact::{ContactMode, ContactState};
+use super::contact::{ContactConstraint, ContactMode, ContactState};
 use super::springs::{self, Sums};
 use super::stage::{FrameContext, Stage, StageSolver};
-use super::system::{smoother, solve_lower};
+use super::system::{System, smoother, solve_lower};
 use numerics::partition::{Partition, RaggedSlice};
 use numerics::rank_one::{RankOneTerms, add_square};
 use numerics::vector::DVec3;
@@ -47,16 +47,18 @@ impl StageSolver {
         }
     }
 
-    /// All forces on a particle but those of its springs. `regions` are those of the system, which may have been moved out.
+    /// The forces on a particle besides those of springs, contacts and thin tetrahedra. `regions` are those of the system, which may have been moved out.
     #[inline(always)]
     fn own_force(&self, regions: &RankOneTerms, stage: &Stage<'_>, particle: usize, [x, v]: [&[DVec3]; 2]) -> DVec3 {
         let FrameContext { body, external, .. } = stage.context;
-        let mut sum = external.force(particle, body.mass[particle], &stage.now, x[particle], v[particle]);
-        sum -= regions.gather(particle, &self.volumes.pressures, &self.volumes.gradients);
-        if let Some(transient_forces) = self.transient_forces.get(particle) {
-            sum += transient_forces;
-        }
-        sum
+        let own = external.force(particle, body.mass[particle], &stage.now, x[particle], v[particle]);
+        own - regions.gather(particle, &self.volumes.pressures, &self.volumes.gradients)
+    }
+
+    /// The `others` among the forces on a particle, with those of contacts and thin tetrahedra.
+    #[inline(always)]
+    fn with_transient_force(&self, particle: usize, others: DVec3) -> DVec3 {
+        self.transient_forces.get(particle).map_or(others, |force| others + force)
     }
 
     /// Evaluates the residual at `x`, and if `linear` the linear system too.
@@ -65,6 +67,11 @@ impl StageSolver {
         velocities(stage, x, &mut v);
         self.update_transient_forces(stage, x, &v);
         if linear {
+            self.volumes.linearise();
+            if !self.volumes.is_disabled() {
+                let weights = self.volumes.weights(stage.a);
+                self.system.regions.set(&weights, &self.volumes.gradients, &stage.context.body.order.clusters);
+            }
             self.linearise_steep_forces(stage);
             self.set_rank_one_terms(stage);
             self.assemble_system(stage, [x, &v], &mut r);
@@ -74,6 +81,38 @@ impl StageSolver {
             });
         }
         (self.v, self.r) = (v, r);
+    }
+
+    /// As [`Self::assemble`] of the linear system, after one at the same `x` since which only contacts changed.
+    pub(super) fn assemble_contacts(&mut self, stage: &Stage<'_>, x: &[DVec3]) {
+        let (v, mut r) = (std::mem::take(&mut self.v), std::mem::take(&mut self.r));
+        self.measured = true;
+        self.update_transient_forces(stage, x, &v);
+        self.linearise_steep_forces(stage);
+        self.set_rank_one_terms(stage);
+        let mut smoother = std::mem::take(&mut self.system.smoother);
+        let of_contacts = stage.contacts.iter().flat_map(ContactConstraint::sides).map(|side| side.0);
+        let of_tets = self.thin_tets.iter().flat_map(|thin| thin.corners).map(|corner| corner as usize);
+        for particle in of_contacts.chain(of_tets) {
+            (r[particle], smoother[particle]) = self.complete(&self.system, stage, particle, x);
+        }
+        self.system.smoother = smoother;
+        (self.v, self.r) = (v, r);
+    }
+
+    /// Residual and smoother of a particle at `x`, from what `system` has of springs, regions and external forces, with
+    /// contacts and thin tetrahedra.
+    #[inline(always)]
+    fn complete(&self, system: &System, stage: &Stage<'_>, particle: usize, x: &[DVec3]) -> (DVec3, [f32; 6]) {
+        let Sums { pull, others, mut block } = system.sums[particle];
+        system.transient.add_block(particle, 1.0, usize::MAX, &mut block);
+        if let Some(other) = system.blocks.get(particle) {
+            block.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
+        }
+        [0, 3, 5].iter().for_each(|diagonal| block[*diagonal] += system.inertia[particle]);
+        let held = system.held[particle];
+        let force = pull + self.with_transient_force(particle, others);
+        (stage.residual(held, particle, x, force), if held { [0.0; 6] } else { smoother(&block) })
     }
 
     /// Sets `out` to `of` of each particle and the force on it, at positions `x` with velocities `v`.
@@ -92,7 +131,8 @@ impl StageSolver {
             for particle in particles {
                 springs::pull(body.adjacency.of(particle, &self.links), x, particle, first, out);
                 let out = &mut out[particle - first];
-                *out = of(particle, *out + self.own_force(&self.system.regions, stage, particle, [x, v]));
+                let others = self.own_force(&self.system.regions, stage, particle, [x, v]);
+                *out = of(particle, *out + self.with_transient_force(particle, others));
             }
         });
     }
@@ -103,47 +143,34 @@ impl StageSolver {
         let FrameContext { body, external, .. } = stage.context;
         let clusters = &body.order.clusters;
         let mut system = std::mem::take(&mut self.system);
-        let (held, blocks, regions, transient) = (&system.held, &system.blocks, &system.regions, &system.transient);
-        let per_particle = (
-            r,
-            &mut system.inertia[..],
-            &mut system.smoother[..],
-            RaggedSlice::new(&body.adjacency.starts, &mut system.records),
-        );
+        let regions = &system.regions;
+        let records = RaggedSlice::new(&body.adjacency.starts, &mut system.records);
+        let (sums, inertia) = (&mut system.sums[..], &mut system.inertia[..]);
         let solver = &*self;
-        clusters.for_each(per_particle, |cluster, (r, inertia, smooth, mut records)| {
+        clusters.for_each((sums, inertia, records), |cluster, (sums, inertia, records)| {
             let particles = clusters.range(cluster);
-            let first = particles.start;
-            r.fill(DVec3::zeros());
-            let mut sums = Sums { forces: r, blocks: &mut vec![[0.0; 6]; particles.len()] };
-            for (((particle, inertia), smooth), records) in particles.zip(inertia).zip(smooth).zip(records.iter_mut()) {
-                let links = body.adjacency.of(particle, &solver.links);
-                springs::linearise(links, records, x, stage.a, particle, first, &mut sums);
-                let (pull, mut block) = (sums.forces[particle - first], sums.blocks[particle - first]);
-                let force = pull + solver.own_force(regions, stage, particle, [x, v]);
-                regions.add_block(particle, OVERLAP, usize::MAX, &mut block);
-                transient.add_block(particle, 1.0, usize::MAX, &mut block);
-                if let Some(other) = blocks.get(particle) {
-                    block.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
-                }
+            springs::linearise(&body.adjacency, &solver.links, records, x, stage.a, particles.clone(), sums);
+            for ((particle, sums), inertia) in particles.zip(sums).zip(inertia) {
+                sums.others = solver.own_force(regions, stage, particle, [x, v]);
+                regions.add_block(particle, OVERLAP, usize::MAX, &mut sums.block);
                 let mass = body.mass[particle];
                 *inertia = mass + external.inertia(particle, mass, &stage.now, stage.a);
-                [0, 3, 5].iter().for_each(|diagonal| block[*diagonal] += *inertia);
-                sums.forces[particle - first] = stage.residual(held[particle], particle, x, force);
-                *smooth = if held[particle] { [0.0; 6] } else { smoother(&block) };
             }
         });
+        let mut smoother = std::mem::take(&mut system.smoother);
+        clusters.for_each((r, &mut smoother[..]), |cluster, (r, smooth): (&mut [DVec3], &mut [[f32; 6]])| {
+            for ((particle, r), smooth) in clusters.range(cluster).zip(r).zip(smooth) {
+                (*r, *smooth) = solver.complete(&system, stage, particle, x);
+            }
+        });
+        system.smoother = smoother;
         self.system = system;
     }
 
-    /// Sets up the rank-one terms of volumes, thin tetrahedra and contacts.
+    /// Sets up the rank-one terms of thin tetrahedra and contacts.
     fn set_rank_one_terms(&mut self, stage: &Stage<'_>) {
         let (body, a) = (stage.context.body, stage.a);
         let clusters = &body.order.clusters;
-        if !self.volumes.is_disabled() {
-            let weights = self.volumes.weights(a);
-            self.system.regions.set(&weights, &self.volumes.gradients, clusters);
-        }
         self.system.blocks.clear();
         self.system.anchors = self.thin_tets.len();
         let (mut starts, mut particles, mut along) = (vec![0u32], Vec::new(), Vec::new());

@@ -68,10 +68,14 @@ impl StageSolver {
         let mut solved = Solved::default();
         let (mut base, mut slow, mut stuck, mut reloads) = (ObjectiveParts::default(), false, false, 0);
         // How far particles may have moved since tetrahedra were last watched.
-        let mut moved = f64::INFINITY;
+        let (mut moved, mut reloaded) = (f64::INFINITY, false);
         loop {
             let stage = &Stage { contacts: &*contacts, ..*stage };
-            self.assemble(stage, x, true);
+            if std::mem::take(&mut reloaded) {
+                self.assemble_contacts(stage, x);
+            } else {
+                self.assemble(stage, x, true);
+            }
             let now = self.square(stage);
             if solved.newton == 0 {
                 solved.first = if before.first > 0.0 { before.first } else { now };
@@ -86,7 +90,7 @@ impl StageSolver {
             if reload && !deep && (stuck || balance.is_readable()) {
                 let a = stage.a;
                 base.contacts += self.reload(contacts, x, a, context.body.size);
-                (slow, stuck, reloads, self.measured) = (false, false, reloads + 1, true);
+                (slow, stuck, reloads, reloaded) = (false, false, reloads + 1, true);
                 continue;
             }
             let wanted = (now > solved.enough && !slow) || deep || reload || !balance.is_in_balance();

@@ -8,11 +8,14 @@
 //! positive semi-definite at any length. K and R combine spring and dashpot, see [`Link`].
 
 use super::body::SoftBody;
-use numerics::adjacency::Incident;
+use numerics::adjacency::{Adjacency, Incident};
 use numerics::partition::RaggedSlice;
 use numerics::random::Key;
+use numerics::simd::{Path, kernel};
 use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 
+/// Springs that are linearised together.
+const LANES: usize = 8;
 /// Largest a²k of a record: products with displacements stay well within the range of f32.
 const MOST_STIFFNESS: f64 = 1e24;
 
@@ -167,11 +170,10 @@ fn degenerate_direction(d: DVec3, spring: u32, first: bool) -> (DVec3, f64) {
 }
 
 impl Link {
-    /// Force on `particle` along the spring, newtons, and H for a stage of `a`, in full and as a record.
-    #[inline(always)]
-    fn linearise(&self, x: &[DVec3], a: f64, particle: usize, record: &mut Record) -> (DVec3, [f64; 6]) {
+    /// [`Pulls`] where the squared length under- or overflows.
+    #[cold]
+    fn degenerate_pull(&self, x: &[DVec3], a: f64, particle: usize) -> (DVec3, f64, DVec3) {
         let view = SpringView::from(self, particle, x);
-        let force = view.direction * view.tension(self);
         let k = (a * a * f64::from(self.k)).min(MOST_STIFFNESS);
         let alpha = if view.length > 0.0 {
             k * (1.0 - self.rest * view.inverse).max(0.0)
@@ -180,10 +182,72 @@ impl Link {
         } else {
             k
         };
-        let w = view.direction * (k - alpha).max(0.0).sqrt();
-        *record = Record { other: self.other, alpha: alpha as f32, w: to_f32(w) };
-        let h = [alpha + w.x * w.x, w.x * w.y, w.x * w.z, alpha + w.y * w.y, w.y * w.z, alpha + w.z * w.z];
-        (force, h)
+        (view.direction * view.tension(self), alpha, view.direction * (k - alpha).max(0.0).sqrt())
+    }
+}
+
+/// Springs seen from one end, eight at a time: at first the offset from the other end, K and R, then the results.
+#[derive(Clone, Copy)]
+struct Pulls {
+    offset: [[f64; LANES]; 3],
+    k: [f64; LANES],
+    rest: [f64; LANES],
+    /// Force along the spring, newtons.
+    pull: [[f64; LANES]; 3],
+    /// α and w of H.
+    alpha: [f64; LANES],
+    w: [[f64; LANES]; 3],
+    /// Whether the squared length has not lost precision.
+    sound: [bool; LANES],
+}
+
+impl Pulls {
+    /// Springs of length 1 without stiffness.
+    const NONE: Self = Self {
+        offset: [[1.0; LANES], [0.0; LANES], [0.0; LANES]],
+        k: [0.0; LANES],
+        rest: [0.0; LANES],
+        pull: [[0.0; LANES]; 3],
+        alpha: [0.0; LANES],
+        w: [[0.0; LANES]; 3],
+        sound: [true; LANES],
+    };
+
+    fn set(&mut self, lane: usize, link: &Link, offset: DVec3) {
+        (0..3).for_each(|axis| self.offset[axis][lane] = offset[axis]);
+        (self.k[lane], self.rest[lane]) = (f64::from(link.k), link.rest);
+    }
+
+    #[inline(always)]
+    fn at(&self, lane: usize) -> (DVec3, f64, DVec3) {
+        let [pull, w] = [&self.pull, &self.w].map(|v| DVec3::new(v[0][lane], v[1][lane], v[2][lane]));
+        (pull, self.alpha[lane], w)
+    }
+}
+
+kernel! {
+    /// Computes forces and H for a stage of `a`.
+    fn compute_pulls(pulls: &mut [Pulls], a: f64) = compute_pulls_body;
+}
+
+#[inline(always)]
+fn compute_pulls_body(pulls: &mut [Pulls], a: f64) {
+    for pulls in pulls {
+        let Pulls { offset: [x, y, z], k, rest, pull, alpha, w, sound } = pulls;
+        for i in 0..LANES {
+            let squared = x[i] * x[i] + y[i] * y[i] + z[i] * z[i];
+            sound[i] = squared > 1e-280 && squared < 1e280;
+            let length = squared.sqrt();
+            let inverse = 1.0 / length;
+            let direction = [x[i] * inverse, y[i] * inverse, z[i] * inverse];
+            let tension = k[i] * (length - rest[i]);
+            let stiff = (a * a * k[i]).min(MOST_STIFFNESS);
+            alpha[i] = stiff * (1.0 - rest[i] * inverse).max(0.0);
+            let root = (stiff - alpha[i]).max(0.0).sqrt();
+            (pull[0][i], pull[1][i], pull[2][i]) =
+                (direction[0] * tension, direction[1] * tension, direction[2] * tension);
+            (w[0][i], w[1][i], w[2][i]) = (direction[0] * root, direction[1] * root, direction[2] * root);
+        }
     }
 }
 
@@ -205,40 +269,68 @@ pub(super) fn pull([inside, across]: [&[Link]; 2], x: &[DVec3], particle: usize,
     forces[particle - first] = sum;
 }
 
-/// Accumulators of [`linearise`], one for each particle of a cluster: forces, and sums of H.
-pub(super) struct Sums<'a> {
-    pub(super) forces: &'a mut [DVec3],
-    pub(super) blocks: &'a mut [[f64; 6]],
+/// What acts on a particle besides contacts and thin tetrahedra.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sums {
+    /// The force of its springs, newtons.
+    pub(super) pull: DVec3,
+    /// External forces and those of regions, newtons.
+    pub(super) others: DVec3,
+    /// The diagonal block of springs and regions in the linear system: xx, xy, xz, yy, yz, zz.
+    pub(super) block: [f64; 6],
 }
 
-/// As [`pull`], and sets the `records` of the springs for a stage of `a` and adds their H.
-#[inline(always)]
+impl Sums {
+    /// Adds the force and H of a spring.
+    #[inline(always)]
+    fn add(&mut self, pull: DVec3, h: [f64; 6]) {
+        self.pull += pull;
+        self.block.iter_mut().zip(h).for_each(|(sum, h)| *sum += h);
+    }
+}
+
+/// Sets `sums` to those of the springs of a cluster's `particles` at `x`, and sets the `records` of these springs, for a
+/// stage of `a`.
 pub(super) fn linearise(
-    [inside, across]: [&[Link]; 2],
-    records: &mut [Record],
+    adjacency: &Adjacency,
+    links: &[Link],
+    mut records: RaggedSlice<'_, Record>,
     x: &[DVec3],
     a: f64,
-    particle: usize,
-    first: usize,
-    sums: &mut Sums<'_>,
+    particles: std::ops::Range<usize>,
+    sums: &mut [Sums],
 ) {
-    let add = |sum: &mut [f64; 6], h: [f64; 6]| sum.iter_mut().zip(h).for_each(|(sum, h)| *sum += h);
-    let (mut force, mut block) = (sums.forces[particle - first], sums.blocks[particle - first]);
-    let (inside_records, across_records) = records.split_at_mut(inside.len());
-    for (link, record) in inside.iter().zip(inside_records) {
-        let (pull, h) = link.linearise(x, a, particle, record);
-        let other = link.other as usize - first;
-        force -= pull;
-        add(&mut block, h);
-        sums.forces[other] += pull;
-        add(&mut sums.blocks[other], h);
+    let first = particles.start;
+    let begin = adjacency.starts[first] as usize;
+    let count = adjacency.starts[particles.end] as usize - begin;
+    let mut pulls = vec![Pulls::NONE; count.div_ceil(LANES)];
+    let mut at = 0;
+    for particle in particles.clone() {
+        for link in adjacency.of(particle, links).into_iter().flatten() {
+            pulls[at / LANES].set(at % LANES, link, x[particle] - x[link.other as usize]);
+            at += 1;
+        }
     }
-    for (link, record) in across.iter().zip(across_records) {
-        let (pull, h) = link.linearise(x, a, particle, record);
-        force -= pull;
-        add(&mut block, h);
+    compute_pulls(Path::chosen(), &mut pulls, a);
+    sums.fill(Sums::default());
+    at = 0;
+    for (particle, records) in particles.zip(records.iter_mut()) {
+        let [inside, across] = adjacency.of(particle, links);
+        let mut sum = sums[particle - first];
+        for (index, (link, record)) in inside.iter().chain(across).zip(records).enumerate() {
+            let pulls = &pulls[at / LANES];
+            let (pull, alpha, w) =
+                if pulls.sound[at % LANES] { pulls.at(at % LANES) } else { link.degenerate_pull(x, a, particle) };
+            at += 1;
+            *record = Record { other: link.other, alpha: alpha as f32, w: to_f32(w) };
+            let h = [alpha + w.x * w.x, w.x * w.y, w.x * w.z, alpha + w.y * w.y, w.y * w.z, alpha + w.z * w.z];
+            sum.add(-pull, h);
+            if index < inside.len() {
+                sums[link.other as usize - first].add(pull, h);
+            }
+        }
+        sums[particle - first] = sum;
     }
-    (sums.forces[particle - first], sums.blocks[particle - first]) = (force, block);
 }
 
 /// Elastic energy of spring `at`, joules.

@@ -11,7 +11,7 @@ use super::conjugate_gradients::{Coarse, Limits, Reached};
 use super::contact::{ContactConstraint, ContactState};
 use super::external::{ExternalForces, Moment};
 use super::galerkin::Galerkin;
-use super::springs::{self, Link, Record, RestLengths};
+use super::springs::{self, Link, Record, RestLengths, Sums};
 use super::state::CachedCoarseFactor;
 use super::system::System;
 use super::volume::{Inventory, ThinTet, Volumes};
@@ -175,6 +175,7 @@ impl StageSolver {
         let count = body.len();
         let mut system = System {
             records: vec![Record::default(); body.adjacency.incident.len()],
+            sums: vec![Sums::default(); count],
             inertia: vec![0.0; count],
             held: vec![false; count],
             isolated: vec![false; count],

@@ -6,14 +6,15 @@
 
 use super::contact::ContactState;
 use super::stage::{Stage, StageSolver};
+use numerics::vector::DVec3;
 
 impl StageSolver {
-    /// Linearises contact forces and pressures at the predicted ones instead of the current ones, where they are smaller.
+    /// Linearises forces of contacts and thin tetrahedra at the predicted ones instead of the current ones, where they are
+    /// smaller.
     pub(super) fn linearise_steep_forces(&mut self, stage: &Stage<'_>) {
         for (contact, state) in stage.contacts.iter().zip(&mut self.contact_states) {
             contact.linearise(state);
         }
-        self.volumes.linearise();
         let Some(pressures) = self.predicted_pressures.as_ref().filter(|_| stage.line_search) else { return };
         for thin in &mut self.thin_tets {
             let known = pressures.binary_search_by_key(&thin.tet, |known| known.0);
@@ -48,9 +49,12 @@ impl StageSolver {
         }
         let (volumes, regions) = (&self.volumes, &self.system.regions);
         if volumes.offsets.iter().any(|offset| *offset != 0.0) {
-            for (particle, r) in self.r.iter_mut().enumerate().filter(|(particle, _)| !held[*particle]) {
-                *r -= regions.gather(particle, &volumes.offsets, &volumes.gradients) * square;
-            }
+            let clusters = &stage.context.body.order.clusters;
+            clusters.for_each(&mut self.r[..], |cluster, r: &mut [DVec3]| {
+                for (particle, r) in clusters.range(cluster).zip(r).filter(|(particle, _)| !held[*particle]) {
+                    *r -= regions.gather(particle, &volumes.offsets, &volumes.gradients) * square;
+                }
+            });
         }
     }
 }

@@ -6,8 +6,10 @@
 //! 1e7.) Vectors are f64.
 
 use super::body::SoftBody;
-use super::springs::Record;
+use super::springs::{Record, Sums};
+use numerics::adjacency::Adjacency;
 use numerics::rank_one::RankOneTerms;
+use numerics::simd::{Path, kernel};
 use numerics::vector::DVec3;
 
 /// M + a²K + aC at some positions.
@@ -15,6 +17,8 @@ use numerics::vector::DVec3;
 pub(super) struct System {
     /// Springs, one for each entry of `SoftBody::adjacency`.
     pub(super) records: Vec<Record>,
+    /// What acts on each particle besides contacts and thin tetrahedra.
+    pub(super) sums: Vec<Sums>,
     /// Isotropic diagonal terms of each particle: mass, drag, goals. Kilograms.
     pub(super) inertia: Vec<f64>,
     /// Contacts of single particles, xx xy xz yy yz zz; empty without any. In f64: penalties may be 1e12 times as stiff as what
@@ -41,42 +45,8 @@ impl System {
         self.regions.measure(p);
         self.transient.measure(p);
         let system = &*self;
-        let (regions, transient) = (!system.regions.is_empty(), !system.transient.is_empty());
         clusters.sum(out, |cluster, out: &mut [DVec3]| {
-            let particles = clusters.range(cluster);
-            let first = particles.start;
-            out.fill(DVec3::zeros());
-            let mut sum = 0.0;
-            for particle in particles {
-                let mine = p[particle];
-                let mut total = out[particle - first] + mine * system.inertia[particle];
-                let [inside, across] = body.adjacency.of(particle, &system.records);
-                for record in inside {
-                    let other = record.other as usize;
-                    let force = record.times(mine - p[other]);
-                    total += force;
-                    out[other - first] -= force;
-                }
-                for record in across {
-                    total += record.times(mine - p[record.other as usize]);
-                }
-                if system.held[particle] {
-                    out[particle - first] = DVec3::zeros();
-                    continue;
-                }
-                if !system.blocks.is_empty() {
-                    total += times(&system.blocks[particle], mine);
-                }
-                if regions {
-                    total += system.regions.push(particle);
-                }
-                if transient {
-                    total += system.transient.push(particle);
-                }
-                out[particle - first] = total;
-                sum += mine.dot(&total);
-            }
-            sum
+            apply_in_cluster(Path::chosen(), system, &body.adjacency, clusters.range(cluster), p, out)
         })
     }
 
@@ -91,6 +61,61 @@ impl System {
     pub(super) fn is_loose(&self, particle: usize) -> bool {
         self.held[particle] || self.isolated[particle]
     }
+}
+
+kernel! {
+    /// The part of [`System::apply`] that belongs to one cluster.
+    fn apply_in_cluster(
+        system: &System,
+        adjacency: &Adjacency,
+        particles: std::ops::Range<usize>,
+        p: &[DVec3],
+        out: &mut [DVec3],
+    ) -> f64 = apply_in_cluster_body;
+}
+
+#[inline(always)]
+fn apply_in_cluster_body(
+    system: &System,
+    adjacency: &Adjacency,
+    particles: std::ops::Range<usize>,
+    p: &[DVec3],
+    out: &mut [DVec3],
+) -> f64 {
+    let (regions, transient) = (!system.regions.is_empty(), !system.transient.is_empty());
+    let first = particles.start;
+    out.fill(DVec3::zeros());
+    let mut sum = 0.0;
+    for particle in particles {
+        let mine = p[particle];
+        let mut total = out[particle - first] + mine * system.inertia[particle];
+        let [inside, across] = adjacency.of(particle, &system.records);
+        for record in inside {
+            let other = record.other as usize;
+            let force = record.times(mine - p[other]);
+            total += force;
+            out[other - first] -= force;
+        }
+        for record in across {
+            total += record.times(mine - p[record.other as usize]);
+        }
+        if system.held[particle] {
+            out[particle - first] = DVec3::zeros();
+            continue;
+        }
+        if !system.blocks.is_empty() {
+            total += times(&system.blocks[particle], mine);
+        }
+        if regions {
+            total += system.regions.push(particle);
+        }
+        if transient {
+            total += system.transient.push(particle);
+        }
+        out[particle - first] = total;
+        sum += mine.dot(&total);
+    }
+    sum
 }
 
 /// A symmetric block times a vector.
