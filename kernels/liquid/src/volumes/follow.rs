@@ -99,6 +99,7 @@ impl VolumeTargets {
         let mut passages = passages(surface.markers().pieces(), &now);
         self.keep_unmarked(surface, &found, &mut passages);
         let unknown = self.newcomers(surface, &found, &mut passages);
+        self.take_before_they_split(&found, unit, size, &passages);
         let shares = |phase: usize| {
             let targets: Vec<f64> = self.pieces.iter().map(|piece| piece.of_phase(phase)).collect();
             let volumes: Vec<f64> = (0..found.all.len()).map(|piece| unit * found.volume_of(piece, phase)).collect();
@@ -163,12 +164,42 @@ impl VolumeTargets {
                 let is_near = (0..3).all(|axis| low[axis] <= cell[axis] && cell[axis] < high[axis]);
                 votes[*old as usize] += usize::from(is_near && around.find(cell).is_some());
             }
-            match (0..votes.len()).rev().max_by_key(|old| votes[*old]).filter(|old| votes[*old] > 0) {
+            let voted = (0..votes.len()).rev().max_by_key(|old| votes[*old]).filter(|old| votes[*old] > 0);
+            match voted.or_else(|| self.where_it_is(found, new)) {
                 Some(old) => passages.push(Passage { old, new, markers: 1 }),
                 None => unknown.push(new),
             }
         }
         unknown
+    }
+
+    /// The old piece that most cells of a new one were of, where that is half of them or more.
+    fn where_it_is(&self, found: &Pieces, new: usize) -> Option<usize> {
+        let cells = found.cells_of(new);
+        let mut shared = vec![0_usize; self.pieces.len()];
+        for old in cells.iter().filter_map(|cell| self.cells.of_cell(*cell)) {
+            shared[old as usize] += 1;
+        }
+        (0..shared.len()).rev().max_by_key(|old| shared[*old]).filter(|old| 2 * shared[*old] >= cells.len().max(1))
+    }
+
+    /// Takes what went from an old piece that is now several, or none, before its target is passed on: which of them it would
+    /// have been taken from is chance.
+    fn take_before_they_split(&mut self, found: &Pieces, unit: f64, size: f32, passages: &[Passage]) {
+        let mut ways = vec![0; self.pieces.len()];
+        passages.iter().for_each(|passage| ways[passage.old] += 1);
+        let Self { pieces, cells, changes, .. } = self;
+        for change in changes.iter_mut().filter(|change| change.volume < 0.0) {
+            let Some(at) = change.at else { continue };
+            let Some(old) = cells.of_cell(scale(at, size).map(floor)).map(|old| old as usize) else { continue };
+            if ways[old] != 1 {
+                let parts = || passages.iter().filter(|passage| passage.old == old);
+                let there = |phase| parts().fold(0.0, |sum, part| sum + unit * found.volume_of(part.new, phase));
+                let mut own: Vec<&mut f64> = pieces[old].phases.iter_mut().collect();
+                change.volume = take_from(&mut own, there, change.volume);
+            }
+        }
+        changes.retain(|change| change.volume != 0.0);
     }
 
     /// The old pieces that are in no new one, where their markers are now.

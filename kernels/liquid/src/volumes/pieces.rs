@@ -4,6 +4,7 @@ use std::f32::consts::FRAC_1_SQRT_2;
 
 use numerics::parallel;
 use numerics::vector::{Vec3, dot, length, scale, sub};
+use serde::{Deserialize, Serialize};
 
 use super::phases::{PhasesOfPieces, Ways};
 use crate::carried::{PhaseReader, PhaseShares};
@@ -48,6 +49,23 @@ pub(super) struct Pieces {
     /// φ outside solids, where there are any.
     clipped: Option<Vec<f32>>,
     pub(super) phases: PhasesOfPieces,
+}
+
+/// Which piece each cell inside is of.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct PieceCells {
+    inside: CellRows,
+    /// The first cell of a span from which on all are of a piece, and that piece.
+    runs: Vec<(u32, u32)>,
+}
+
+impl PieceCells {
+    /// The piece of a cell inside.
+    pub(super) fn of_cell(&self, cell: Cell) -> Option<u32> {
+        let span = self.inside.span_of(cell)?;
+        let after = self.runs.partition_point(|(first, _)| *first <= span.base);
+        self.runs.get(after.checked_sub(1)?).map(|(_, piece)| *piece)
+    }
 }
 
 /// What a quad lies on.
@@ -187,7 +205,19 @@ impl Pieces {
         closest
     }
 
-    fn cells_of(&self, piece: usize) -> Vec<Cell> {
+    /// Where all of them are.
+    pub(super) fn cells(&self) -> PieceCells {
+        let mut runs: Vec<(u32, u32)> = Vec::new();
+        for (_, span) in self.inside.spans() {
+            let piece = self.of_span[span.base as usize];
+            if runs.last().is_none_or(|(_, last)| *last != piece) {
+                runs.push((span.base, piece));
+            }
+        }
+        PieceCells { inside: self.inside.clone(), runs }
+    }
+
+    pub(super) fn cells_of(&self, piece: usize) -> Vec<Cell> {
         let own = self.inside.spans().filter(|(_, span)| self.of_span[span.base as usize] as usize == piece);
         own.flat_map(|([y, z], span)| (span.start..span.end).map(move |x| [x, y, z])).collect()
     }

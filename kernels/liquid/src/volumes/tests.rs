@@ -149,6 +149,26 @@ fn a_piece_that_vanishes_is_lost_with_its_volume() {
     assert!(taken.lost.is_empty() && taken.target == report.target, "{taken:?}");
 }
 
+/// What a sink as wide as the box leaves of a pool has no marker of before: a half of it, or two quarters.
+#[test]
+fn what_a_sink_leaves_is_the_piece_that_it_was() {
+    let pool = || start([12, 14, 12], |p| p[1] - 10.0);
+    for (low, high, left) in [(4.0, 11.0, vec![576.0]), (3.0, 6.0, vec![432.0, 576.0])] {
+        let (mut surface, mut targets) = pool();
+        assert_near(sum(&targets), 1440.0, 1e-6);
+        surface.change([0; 3], [12, 14, 12], &move |p, phi| phi.max((p[1] - low).min(high - p[1])));
+        let went = left.iter().sum::<f64>() - 1440.0;
+        targets.add(went, Some([6.5, low + 1.5, 6.5]));
+        let report = targets.correct(&mut surface, None);
+        assert!(report.lost.is_empty() && targets.waiting() == 0.0, "{report:?}");
+        let mut found: Vec<f64> = targets.pieces().iter().map(PieceTarget::volume).collect();
+        found.sort_by(f64::total_cmp);
+        assert_eq!(found.len(), left.len(), "{found:?}");
+        found.iter().zip(&left).for_each(|(found, left)| assert_near(*found, *left, 1e-4));
+        assert!(report.drift.abs() < 1e-4, "{report:?}");
+    }
+}
+
 #[test]
 fn a_piece_smaller_than_a_cell_is_lost_with_its_volume_but_not_beside_a_solid() {
     let at = [14.5, 14.5, 10.5];
