@@ -58,8 +58,9 @@ pub(super) fn passages(old: &[u32], new: &[u32]) -> Vec<Passage> {
 }
 
 /// The targets of new pieces that enclose `volumes`, of which each old target is passed on whole. One that splits is shared
-/// by what the new pieces enclose, without what they have from pieces that did not split.
-pub(super) fn passed_on(targets: &[f64], passages: &[Passage], volumes: &[f64]) -> Vec<f64> {
+/// by what the new pieces enclose, without what they have from pieces that did not split. `least`: what each counts for at
+/// least.
+pub(super) fn passed_on(targets: &[f64], passages: &[Passage], volumes: &[f64], least: f64) -> Vec<f64> {
     let mut ways = vec![0; targets.len()];
     passages.iter().for_each(|passage| ways[passage.old] += 1);
     let (whole, split): (Vec<&Passage>, Vec<&Passage>) = passages.iter().partition(|passage| ways[passage.old] == 1);
@@ -70,7 +71,7 @@ pub(super) fn passed_on(targets: &[f64], passages: &[Passage], volumes: &[f64]) 
     let weights: Vec<f64> = split
         .iter()
         .map(|passage| {
-            let volume = volumes[passage.new].max(LEAST_VOLUME);
+            let volume = volumes[passage.new].max(least);
             let room = (volume - out[passage.new]).max(LEAST_ROOM * volume);
             room * passage.markers as f64 / markers[passage.new] as f64
         })
@@ -103,7 +104,7 @@ impl VolumeTargets {
         let shares = |phase: usize| {
             let targets: Vec<f64> = self.pieces.iter().map(|piece| piece.of_phase(phase)).collect();
             let volumes: Vec<f64> = (0..found.all.len()).map(|piece| unit * found.volume_of(piece, phase)).collect();
-            passed_on(&targets, &passages, &volumes)
+            passed_on(&targets, &passages, &volumes, LEAST_VOLUME * unit)
         };
         let mut shares: Vec<Vec<f64>> = (0..self.phases().max(found.phases.count())).map(shares).collect();
         let mut is_lost = vec![true; self.pieces.len()];

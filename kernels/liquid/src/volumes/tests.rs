@@ -84,6 +84,24 @@ fn bubbles_belong_to_the_piece_around_them_and_drops_in_them_do_not() {
     assert!(along.iter().any(|r| *r > 9.02) && along.iter().all(|r| *r < 5.99 || *r > 9.01), "{along:?}");
 }
 
+/// Pieces share a target alike at every scale, down to cells of a hundredth of a millimetre.
+#[test]
+fn small_pieces_share_a_target_as_large_ones_do() {
+    let shares = |cell: f64| {
+        let shape = |p: Vec3| ball([8.0, 10.0, 10.0], 5.0)(p).min(ball([18.0, 10.0, 10.0], 3.0)(p));
+        let neck = |p: Vec3| shape(p).min(length([0.0, p[1] - 10.0, p[2] - 10.0]).max((p[0] - 13.0).abs() - 4.0) - 1.5);
+        let mut surface = MarkedSurface::new(Domain::closed([0; 3], [32, 20, 20]), 1, neck, 0, 1);
+        let mut targets = VolumeTargets::new(&mut surface, cell, None);
+        assert_eq!(targets.pieces().len(), 1);
+        surface.change([0; 3], [32, 20, 20], &|p, phi| phi.max(1.5 - (p[0] - 14.0).abs()));
+        targets.correct(&mut surface, None);
+        targets.pieces().iter().map(|piece| piece.volume() / (cell * cell * cell)).collect::<Vec<_>>()
+    };
+    let large = shares(1.0);
+    assert!(large.len() == 2 && large[0] > 2.0 * large[1], "{large:?}");
+    assert_eq!(shares(1.0 / 131_072.0), large);
+}
+
 #[test]
 fn a_ball_that_splits_shares_its_target() {
     let size = [36, 22, 22];
