@@ -38,6 +38,10 @@ const RISE: [f32; 2] = [0.2, 0.5];
 /// where other surfaces may belong to liquid on its far side.
 const RISE_OF_EVEN: [f32; 2] = [0.8, 0.95];
 
+/// How much larger φ is a cell farther out of a solid from which on it is no distance: what is in the solid then belongs to its
+/// other side, up to the middle of a wall that has moved since.
+const STEEP: f32 = 1.5;
+
 /// How far to look for a shore, in surface cells, towards where liquid gets thinner: at a shore the solid is dry there, in a
 /// groove it is not.
 const BESIDE: f32 = 3.0;
@@ -156,9 +160,12 @@ impl MarkedSurface {
                 // Over a film φ rises with the height; where a surface meets the solid it does not.
                 let rise = sampler.at(add(at, normal)) - phi;
                 let inside = -distance(sub(at, scale(normal, height + FILM)));
-                let is_even = inside < 0.5 * FILM || is_shore(&distance, sampler, at, normal);
+                let is_thin = inside < 0.5 * FILM;
+                let is_even = is_thin || is_shore(&distance, sampler, at, normal);
                 let [least, most] = if is_even { RISE_OF_EVEN } else { RISE };
-                let wanted = ((rise - least) / (most - least)).clamp(0.0, 1.0) * (FILM - thickness);
+                let is_other_side = height < 0.0 && rise > STEEP && !is_thin;
+                let share = if is_other_side { 0.0 } else { ((rise - least) / (most - least)).clamp(0.0, 1.0) };
+                let wanted = share * (FILM - thickness);
                 // Half the thickness of the solid, where that is less than a film reaches.
                 depth = wanted.min(0.5 * (FILM + inside) - APART).max(0.0);
             }

@@ -118,6 +118,7 @@ impl<S: Surface> Liquid<S> {
             gain.faces = gained;
         }
         self.motion.liquid_cells += own.len();
+        self.motion.fly_on(&rows);
         self.motion.known = known;
         self.motion.velocity = MacVelocity::new(rows, faces);
     }

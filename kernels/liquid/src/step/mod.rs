@@ -3,7 +3,8 @@
 //!
 //! Order of a substep: velocity continued past the liquid → surface moved → sources fill, sinks empty → velocity carried
 //! onto the new liquid → gravity, read at the substep's middle → pressure, and viscosity
-//! with it ([`Coupling`]). Free fall is then summed as v ← v + g·Δt after the surface moved with the v before.
+//! with it ([`Coupling`]). Liquid that touches nothing moves with the mean of the velocities before and after, and falls by
+//! ½g·t² in substeps of any length; other liquid moves with the velocity before.
 //!
 //! Splitting velocity from pressure loses spin. [`Splitting::KeepsSpin`] adds what is lost before the velocity is carried.
 //! A disk with a free surface, 19 cells in radius, keeps of its angular momentum over a turn (semi-Lagrangian), and a pool
@@ -31,6 +32,7 @@
 mod balls;
 mod domain;
 mod exchange;
+mod flight;
 mod force;
 mod fullness;
 mod motion;

@@ -8,6 +8,7 @@ use crate::level_set::PhiView;
 use crate::pressure::LEAST_DEPTH;
 use crate::rows::{Cell, CellRows, Finder, Images};
 use crate::step::domain::{Domain, Obstacle};
+use crate::step::flight::flying;
 use crate::step::outflow::Outflow;
 use crate::step::sources::FlowAccount;
 use crate::step::substep::most_layers;
@@ -39,6 +40,8 @@ pub struct Motion {
     pub(super) velocity: MacVelocity,
     /// The faces where it is known: those that touch liquid.
     pub(super) known: Vec<FaceMask>,
+    /// The faces of pieces that touch nothing; empty where there are none.
+    pub(super) flying: Vec<FaceMask>,
     pub(super) gain: Option<Gain>,
     pub(super) guess: Guess,
     pub(super) liquid_cells: usize,
@@ -71,9 +74,9 @@ impl Motion {
                 [0, 1, 2].map(|axis| if open(axis) { value(axis, cell) } else { 0.0 })
             },
         );
-        let liquid_cells = cells.count;
+        let (liquid_cells, flying) = (cells.liquid.len(), flying(&cells, &settings.domain));
         let known = cells.known;
-        Self { velocity: MacVelocity::new(cells.rows, faces), known, liquid_cells, ..Self::default() }
+        Self { velocity: MacVelocity::new(cells.rows, faces), known, flying, liquid_cells, ..Self::default() }
     }
 
     /// The cells that the velocity is stored for.
@@ -135,9 +138,7 @@ impl Motion {
 
     /// The largest component of the velocity, m/s.
     pub(super) fn largest_speed(&self) -> f64 {
-        let largest =
-            |field: &Vec<f32>| field.iter().fold(0.0_f32, |most, u| if u.abs() > most { u.abs() } else { most });
-        self.velocity.faces().iter().map(largest).fold(0.0, |most, u| f64::from(u).max(most))
+        largest_of(self.velocity.faces())
     }
 
     /// What no more than one in `rare` components of the velocity exceeds, but at least the largest ÷ `most`, m/s.
@@ -203,6 +204,12 @@ impl Motion {
     }
 }
 
+/// The largest component of a velocity.
+pub(super) fn largest_of(faces: &FaceFields<f32>) -> f64 {
+    let largest = |field: &Vec<f32>| field.iter().fold(0.0_f32, |most, u| if u.abs() > most { u.abs() } else { most });
+    faces.iter().map(largest).fold(0.0, |most, u| f64::from(u).max(most))
+}
+
 /// Nothing flows through closed walls, where the faces of the liquid have not said so.
 fn hold_walls(domain: &Domain, rows: &CellRows, faces: &mut FaceFields<f32>) {
     for ([y, z], span) in rows.spans() {
@@ -258,8 +265,8 @@ pub(super) struct LiquidCells {
     pub moving: Vec<FaceMask>,
     /// Low faces that touch liquid and whose velocity is known: open, or a wall of the domain.
     pub known: Vec<FaceMask>,
-    /// Number of liquid cells.
-    pub count: usize,
+    /// The liquid cells.
+    pub liquid: CellRows,
     /// Cells that repeat others.
     pub images: Images,
 }
@@ -296,7 +303,7 @@ impl LiquidCells {
         debug_assert!(moving.iter().zip(&known).all(|(moving, known)| moving & !known == 0 && *known <= ALL_FACES));
         images.fill(&mut moving);
         images.fill(&mut known);
-        Self { count: liquid.len(), rows, level_set, outside, open, solid_velocity, moving, known, images }
+        Self { liquid, rows, level_set, outside, open, solid_velocity, moving, known, images }
     }
 
     /// φ on wider rows.

@@ -6,7 +6,8 @@ use crate::level_set::{Distance, Held, PhiChange, PhiView, far_from_surface, hel
 use crate::rows::{Cell, Periods};
 use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
-use crate::step::motion::{Gain, LiquidCells, Motion};
+use crate::step::flight::flying;
+use crate::step::motion::{Gain, LiquidCells, Motion, largest_of};
 use crate::step::outflow::outflow;
 use crate::step::project::{Materials, Projection};
 use crate::step::sources::{LiquidSink, LiquidSource};
@@ -144,9 +145,11 @@ pub(super) fn substep(
     // Where it is and how it moves at the middle of the substep is what pushes the liquid.
     let solid = around.solid.map(|solid| solid.at(middle));
     let step = (seconds / settings.cell) as f32;
-    let way = motion.largest_speed() as f32 * step;
+    let gravity = (around.gravity)(middle).map(|g| g * seconds);
+    let in_flight = motion.in_flight(gravity);
+    let way = in_flight.as_ref().map_or_else(|| motion.largest_speed(), largest_of) as f32 * step;
     let reach = way.min(FARTHEST);
-    let (velocity, carried) = continued(&settings.domain, motion, solid, seconds, [step, reach]);
+    let (velocity, carried) = continued(&settings.domain, motion, in_flight, solid, seconds, [step, reach]);
     let periods = settings.domain.periods();
     let flow = Moving { velocity: &velocity, step, periods, solid };
     let outflow = outflow(&settings.domain, surface.view(), &flow, solid, settings.cell_volume());
@@ -172,7 +175,6 @@ pub(super) fn substep(
     Imposed::set(&imposed, &cells.rows, &mut faces, |velocity| velocity);
     cells.images.fill_each(&mut faces);
     let before = faces.clone();
-    let gravity = (around.gravity)(middle).map(|g| g * seconds);
     for axis in 0..3 {
         let moving = faces[axis].iter_mut().zip(&cells.moving).filter(|(_, mask)| **mask >> axis & 1 == 1);
         moving.for_each(|(u, _)| *u += gravity[axis] as f32);
@@ -189,24 +191,26 @@ pub(super) fn substep(
     report.substeps = 1;
     report.cfl_reached = f64::from(way);
     report.stored_cells = stored_cells;
-    report.liquid_cells = cells.count;
+    report.liquid_cells = cells.liquid.len();
     report.left_domain = left_domain;
     motion.gain = (settings.splitting == Splitting::KeepsSpin).then(|| {
         let gained =
             |axis: usize| faces[axis].iter().zip(&before[axis]).map(|(after, before)| after - before).collect();
         Gain { faces: [gained(0), gained(1), gained(2)], seconds }
     });
-    motion.liquid_cells = cells.count;
+    motion.liquid_cells = cells.liquid.len();
+    motion.flying = flying(&cells, &settings.domain);
     motion.known = cells.known;
     motion.velocity = MacVelocity::new(cells.rows, faces);
     report
 }
 
-/// The velocity, continued past the liquid, and what is carried in its place to keep spin. `step`: cells moved at 1 m/s, and
-/// by the fastest liquid.
+/// The velocity with which the surface moves, continued past the liquid, and what is carried in its place where that is
+/// another. `in_flight`: see [`Motion::in_flight`]; `step`: cells moved at 1 m/s, and by the fastest liquid.
 fn continued(
     domain: &Domain,
     motion: &Motion,
+    in_flight: Option<FaceFields<f32>>,
     solid: Option<Obstacle<'_>>,
     seconds: f64,
     [step, reach]: [f32; 2],
@@ -214,14 +218,18 @@ fn continued(
     let steepest = STEEPEST / step;
     let rows = motion.rows_past_liquid(domain, layers(reach));
     let own = motion.velocity.faces();
-    match &motion.gain {
-        Some(gain) => {
-            let carried = turned::carried(motion, gain, domain.periods(), seconds, step, steepest);
-            let [velocity, carried] = motion.continued([own, &carried], &rows, steepest, domain, solid);
+    let carried = match &motion.gain {
+        Some(gain) => Some(turned::carried(motion, gain, domain.periods(), seconds, step, steepest)),
+        None => in_flight.is_some().then(|| own.clone()),
+    };
+    let moving = in_flight.as_ref().unwrap_or(own);
+    match carried {
+        Some(carried) => {
+            let [velocity, carried] = motion.continued([moving, &carried], &rows, steepest, domain, solid);
             (MacVelocity::new(rows, velocity), Some(carried))
         }
         None => {
-            let [velocity] = motion.continued([own], &rows, steepest, domain, solid);
+            let [velocity] = motion.continued([moving], &rows, steepest, domain, solid);
             (MacVelocity::new(rows, velocity), None)
         }
     }

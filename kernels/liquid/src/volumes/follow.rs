@@ -58,8 +58,9 @@ pub(super) fn passages(old: &[u32], new: &[u32]) -> Vec<Passage> {
 }
 
 /// The targets of new pieces that enclose `volumes`, of which each old target is passed on whole. One that splits is shared
-/// by what the new pieces enclose, without what they have from pieces that did not split.
-pub(super) fn passed_on(targets: &[f64], passages: &[Passage], volumes: &[f64]) -> Vec<f64> {
+/// by what the new pieces enclose, without what they have from pieces that did not split. `least`: what each counts for at
+/// least.
+pub(super) fn passed_on(targets: &[f64], passages: &[Passage], volumes: &[f64], least: f64) -> Vec<f64> {
     let mut ways = vec![0; targets.len()];
     passages.iter().for_each(|passage| ways[passage.old] += 1);
     let (whole, split): (Vec<&Passage>, Vec<&Passage>) = passages.iter().partition(|passage| ways[passage.old] == 1);
@@ -70,7 +71,7 @@ pub(super) fn passed_on(targets: &[f64], passages: &[Passage], volumes: &[f64]) 
     let weights: Vec<f64> = split
         .iter()
         .map(|passage| {
-            let volume = volumes[passage.new].max(LEAST_VOLUME);
+            let volume = volumes[passage.new].max(least);
             let room = (volume - out[passage.new]).max(LEAST_ROOM * volume);
             room * passage.markers as f64 / markers[passage.new] as f64
         })
@@ -99,10 +100,11 @@ impl VolumeTargets {
         let mut passages = passages(surface.markers().pieces(), &now);
         self.keep_unmarked(surface, &found, &mut passages);
         let unknown = self.newcomers(surface, &found, &mut passages);
+        self.take_before_they_split(&found, unit, size, &passages);
         let shares = |phase: usize| {
             let targets: Vec<f64> = self.pieces.iter().map(|piece| piece.of_phase(phase)).collect();
             let volumes: Vec<f64> = (0..found.all.len()).map(|piece| unit * found.volume_of(piece, phase)).collect();
-            passed_on(&targets, &passages, &volumes)
+            passed_on(&targets, &passages, &volumes, LEAST_VOLUME * unit)
         };
         let mut shares: Vec<Vec<f64>> = (0..self.phases().max(found.phases.count())).map(shares).collect();
         let mut is_lost = vec![true; self.pieces.len()];
@@ -163,12 +165,42 @@ impl VolumeTargets {
                 let is_near = (0..3).all(|axis| low[axis] <= cell[axis] && cell[axis] < high[axis]);
                 votes[*old as usize] += usize::from(is_near && around.find(cell).is_some());
             }
-            match (0..votes.len()).rev().max_by_key(|old| votes[*old]).filter(|old| votes[*old] > 0) {
+            let voted = (0..votes.len()).rev().max_by_key(|old| votes[*old]).filter(|old| votes[*old] > 0);
+            match voted.or_else(|| self.where_it_is(found, new)) {
                 Some(old) => passages.push(Passage { old, new, markers: 1 }),
                 None => unknown.push(new),
             }
         }
         unknown
+    }
+
+    /// The old piece that most cells of a new one were of, where that is half of them or more.
+    fn where_it_is(&self, found: &Pieces, new: usize) -> Option<usize> {
+        let cells = found.cells_of(new);
+        let mut shared = vec![0_usize; self.pieces.len()];
+        for old in cells.iter().filter_map(|cell| self.cells.of_cell(*cell)) {
+            shared[old as usize] += 1;
+        }
+        (0..shared.len()).rev().max_by_key(|old| shared[*old]).filter(|old| 2 * shared[*old] >= cells.len().max(1))
+    }
+
+    /// Takes what went from an old piece that is now several, or none, before its target is passed on: which of them it would
+    /// have been taken from is chance.
+    fn take_before_they_split(&mut self, found: &Pieces, unit: f64, size: f32, passages: &[Passage]) {
+        let mut ways = vec![0; self.pieces.len()];
+        passages.iter().for_each(|passage| ways[passage.old] += 1);
+        let Self { pieces, cells, changes, .. } = self;
+        for change in changes.iter_mut().filter(|change| change.volume < 0.0) {
+            let Some(at) = change.at else { continue };
+            let Some(old) = cells.of_cell(scale(at, size).map(floor)).map(|old| old as usize) else { continue };
+            if ways[old] != 1 {
+                let parts = || passages.iter().filter(|passage| passage.old == old);
+                let there = |phase| parts().fold(0.0, |sum, part| sum + unit * found.volume_of(part.new, phase));
+                let mut own: Vec<&mut f64> = pieces[old].phases.iter_mut().collect();
+                change.volume = take_from(&mut own, there, change.volume);
+            }
+        }
+        changes.retain(|change| change.volume != 0.0);
     }
 
     /// The old pieces that are in no new one, where their markers are now.

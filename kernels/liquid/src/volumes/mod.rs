@@ -2,7 +2,8 @@
 //! surface is moved until the mesh encloses that.
 //!
 //! A piece is liquid that the mesh does not part; bubbles belong to the piece around them. Markers tell where its liquid
-//! went: pieces that merge add up their targets, and one that splits shares its target by what the parts enclose. A piece
+//! went, and its cells where a sink has cut its whole surface away: pieces that merge add up their targets, and one that
+//! splits shares its target by what the parts enclose. A piece
 //! that got too small for the grid, [`SMALLEST`] or nothing at all, is lost, with its target, to whoever carries it on.
 //!
 //! Liquids that do not mix are phases of a piece ([`LiquidMaterial`]); each has a target of its own. Two ways lead to it: what a
@@ -34,7 +35,7 @@ use crate::rows::CellRows;
 use crate::step::Surface;
 use follow::marked;
 use phases::{Ways, ways_of_phases};
-use pieces::{Measured, Pieces};
+use pieces::{Measured, PieceCells, Pieces};
 
 /// Error of a piece's volume ÷ its target up to which its surface stays.
 pub const LEAST_ERROR: f64 = 1e-5;
@@ -158,6 +159,8 @@ pub struct VolumeTargets {
     /// The side of a solver cell, m.
     cell: f64,
     pieces: Vec<PieceTarget>,
+    /// Where they are.
+    cells: PieceCells,
     changes: Vec<Change>,
     /// What moving surfaces has added so far, m³.
     corrected: f64,
@@ -183,7 +186,8 @@ impl VolumeTargets {
         let found = Pieces::new(surface, solid, phases);
         let now = marked(surface, &found);
         surface.markers_mut().set_pieces(now);
-        let mut targets = Self { cell, pieces: Vec::new(), changes: Vec::new(), corrected: 0.0 };
+        let (pieces, cells, changes) = (Vec::new(), PieceCells::default(), Vec::new());
+        let mut targets = Self { cell, pieces, cells, changes, corrected: 0.0 };
         let unit = targets.unit(surface);
         let is_off = |seen: f64, known: f64| (unit * seen / known - 1.0).abs() > ROUNDED;
         let known: Vec<Option<f64>> = known_volumes(&found, parts)
@@ -426,6 +430,7 @@ impl VolumeTargets {
             place: scale(piece.place, size),
         };
         self.pieces = found.all.iter().enumerate().map(piece).collect();
+        self.cells = found.cells();
     }
 
     /// How far the surfaces of pieces have to move; at most `cap`. `responses`: how much the volume of each changes ÷ area ·

@@ -4,6 +4,7 @@ use std::f32::consts::FRAC_1_SQRT_2;
 
 use numerics::parallel;
 use numerics::vector::{Vec3, dot, length, scale, sub};
+use serde::{Deserialize, Serialize};
 
 use super::phases::{PhasesOfPieces, Ways};
 use crate::carried::{PhaseReader, PhaseShares};
@@ -12,7 +13,7 @@ use crate::level_set::Distance;
 use crate::level_set::{PhiView, floor};
 use crate::marked::MarkedSurface;
 use crate::markers::{Marker, NO_PIECE};
-use crate::rows::{Cell, CellRows, Finder, Periods, RowSpan};
+use crate::rows::{Cell, CellRows, Finder, Periods};
 use crate::sets::Sets;
 
 /// Distance, in cells, up to which φ moves with a shift; beyond, it is made anew from there.
@@ -48,6 +49,23 @@ pub(super) struct Pieces {
     /// φ outside solids, where there are any.
     clipped: Option<Vec<f32>>,
     pub(super) phases: PhasesOfPieces,
+}
+
+/// Which piece each cell inside is of.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct PieceCells {
+    inside: CellRows,
+    /// The first cell of a span from which on all are of a piece, and that piece.
+    runs: Vec<(u32, u32)>,
+}
+
+impl PieceCells {
+    /// The piece of a cell inside.
+    pub(super) fn of_cell(&self, cell: Cell) -> Option<u32> {
+        let span = self.inside.span_of(cell)?;
+        let after = self.runs.partition_point(|(first, _)| *first <= span.base);
+        self.runs.get(after.checked_sub(1)?).map(|(_, piece)| *piece)
+    }
 }
 
 /// What a quad lies on.
@@ -187,7 +205,19 @@ impl Pieces {
         closest
     }
 
-    fn cells_of(&self, piece: usize) -> Vec<Cell> {
+    /// Where all of them are.
+    pub(super) fn cells(&self) -> PieceCells {
+        let mut runs: Vec<(u32, u32)> = Vec::new();
+        for (_, span) in self.inside.spans() {
+            let piece = self.of_span[span.base as usize];
+            if runs.last().is_none_or(|(_, last)| *last != piece) {
+                runs.push((span.base, piece));
+            }
+        }
+        PieceCells { inside: self.inside.clone(), runs }
+    }
+
+    pub(super) fn cells_of(&self, piece: usize) -> Vec<Cell> {
         let own = self.inside.spans().filter(|(_, span)| self.of_span[span.base as usize] as usize == piece);
         own.flat_map(|([y, z], span)| (span.start..span.end).map(move |x| [x, y, z])).collect()
     }
@@ -320,21 +350,7 @@ fn contains(view: PhiView<'_>, cell: Cell) -> bool {
 
 /// The piece of each span, at its first cell, and how many there are. They are numbered by their first cells.
 fn numbered(inside: &CellRows, periods: Periods, mesh: &QuadMesh, sides: &[Side]) -> (Vec<u32>, usize) {
-    let mut sets = Sets::new(inside.len());
-    for ([y, z], spans) in inside.rows() {
-        join_touching(spans, inside.row(y + 1, z), &mut sets);
-        join_touching(spans, inside.row(y, z + 1), &mut sets);
-        let Periods([nx, ny, nz]) = periods;
-        if ny > 0 && y == 0 {
-            join_touching(spans, inside.row(ny - 1, z), &mut sets);
-        }
-        if nz > 0 && z == 0 {
-            join_touching(spans, inside.row(y, nz - 1), &mut sets);
-        }
-        if let Some(last) = inside.span_of([nx - 1, y, z]).filter(|_| nx > 0 && spans[0].start == 0) {
-            sets.join(spans[0].base, last.base);
-        }
-    }
+    let mut sets = Sets::of_cells(inside, periods);
     let mut surfaces = Sets::new(mesh.points.len());
     for [a, rest @ ..] in &mesh.quads {
         rest.iter().for_each(|b| surfaces.join(*a, *b));
@@ -357,19 +373,6 @@ fn numbered(inside: &CellRows, periods: Periods, mesh: &QuadMesh, sides: &[Side]
         of_span[span.base as usize] = of_span[first as usize];
     }
     (of_span, count as usize)
-}
-
-/// Joins the spans of two rows that share a face.
-fn join_touching(spans: &[RowSpan], others: &[RowSpan], sets: &mut Sets) {
-    let mut next = 0;
-    for span in spans {
-        while next < others.len() && others[next].end <= span.start {
-            next += 1;
-        }
-        for other in others[next..].iter().take_while(|other| other.start < span.end) {
-            sets.join(span.base, other.base);
-        }
-    }
 }
 
 fn measured(inside: &CellRows, of_span: &[u32], count: usize, mesh: &QuadMesh, sides: &[Side]) -> Vec<Measured> {

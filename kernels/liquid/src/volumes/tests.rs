@@ -84,6 +84,24 @@ fn bubbles_belong_to_the_piece_around_them_and_drops_in_them_do_not() {
     assert!(along.iter().any(|r| *r > 9.02) && along.iter().all(|r| *r < 5.99 || *r > 9.01), "{along:?}");
 }
 
+/// Pieces share a target alike at every scale, down to cells of a hundredth of a millimetre.
+#[test]
+fn small_pieces_share_a_target_as_large_ones_do() {
+    let shares = |cell: f64| {
+        let shape = |p: Vec3| ball([8.0, 10.0, 10.0], 5.0)(p).min(ball([18.0, 10.0, 10.0], 3.0)(p));
+        let neck = |p: Vec3| shape(p).min(length([0.0, p[1] - 10.0, p[2] - 10.0]).max((p[0] - 13.0).abs() - 4.0) - 1.5);
+        let mut surface = MarkedSurface::new(Domain::closed([0; 3], [32, 20, 20]), 1, neck, 0, 1);
+        let mut targets = VolumeTargets::new(&mut surface, cell, None);
+        assert_eq!(targets.pieces().len(), 1);
+        surface.change([0; 3], [32, 20, 20], &|p, phi| phi.max(1.5 - (p[0] - 14.0).abs()));
+        targets.correct(&mut surface, None);
+        targets.pieces().iter().map(|piece| piece.volume() / (cell * cell * cell)).collect::<Vec<_>>()
+    };
+    let large = shares(1.0);
+    assert!(large.len() == 2 && large[0] > 2.0 * large[1], "{large:?}");
+    assert_eq!(shares(1.0 / 131_072.0), large);
+}
+
 #[test]
 fn a_ball_that_splits_shares_its_target() {
     let size = [36, 22, 22];
@@ -147,6 +165,26 @@ fn a_piece_that_vanishes_is_lost_with_its_volume() {
     step(&mut sunk.0, &shrink, 7.0);
     let taken = sunk.1.correct(&mut sunk.0, None);
     assert!(taken.lost.is_empty() && taken.target == report.target, "{taken:?}");
+}
+
+/// What a sink as wide as the box leaves of a pool has no marker of before: a half of it, or two quarters.
+#[test]
+fn what_a_sink_leaves_is_the_piece_that_it_was() {
+    let pool = || start([12, 14, 12], |p| p[1] - 10.0);
+    for (low, high, left) in [(4.0, 11.0, vec![576.0]), (3.0, 6.0, vec![432.0, 576.0])] {
+        let (mut surface, mut targets) = pool();
+        assert_near(sum(&targets), 1440.0, 1e-6);
+        surface.change([0; 3], [12, 14, 12], &move |p, phi| phi.max((p[1] - low).min(high - p[1])));
+        let went = left.iter().sum::<f64>() - 1440.0;
+        targets.add(went, Some([6.5, low + 1.5, 6.5]));
+        let report = targets.correct(&mut surface, None);
+        assert!(report.lost.is_empty() && targets.waiting() == 0.0, "{report:?}");
+        let mut found: Vec<f64> = targets.pieces().iter().map(PieceTarget::volume).collect();
+        found.sort_by(f64::total_cmp);
+        assert_eq!(found.len(), left.len(), "{found:?}");
+        found.iter().zip(&left).for_each(|(found, left)| assert_near(*found, *left, 1e-4));
+        assert!(report.drift.abs() < 1e-4, "{report:?}");
+    }
 }
 
 #[test]

@@ -14,10 +14,12 @@ mod rest;
 mod runs;
 mod sources;
 mod spin;
+mod tank;
 mod viscous;
 
 use super::*;
 use crate::level_set::PhiView;
+use crate::rows::Cell;
 use crate::velocity::Site;
 use numerics::vector::{Vec3, length};
 use plain::PlainLevelSet;
