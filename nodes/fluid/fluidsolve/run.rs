@@ -25,8 +25,8 @@ use super::start::liquid_at_start;
 use super::{
     CFL_REACHED, COLLECTING, DENSITY, EULER_CHARACTERISTIC, FAST_SHAPES, IN_COLLIDERS, INITIAL_SPIN, INITIAL_VELOCITY,
     LEFT_DOMAIN, LIQUID_CELLS, MADE_GOOD, MADE_GOOD_NOW, MATERIAL_DRIFT, MISWIRED, OUTSIDE, PARTICLES, PARTICLES_NOW,
-    SINKS, SOURCED, SOURCES, SPRAY, SUNK, SURFACE, TRACERS, TRACERS_OUTSIDE, UNSEEN, VOLUME, VOLUME_BALANCE,
-    VOLUME_CORRECTION, VOLUME_DRIFT, VOLUME_DRIFT_RAW, VOLUME_NOW, WITHHELD, WITHHELD_WIRE,
+    SINKS, SOURCED, SOURCES, SPRAY, SUNK, SURFACE, TIME_SCALE, TRACERS, TRACERS_OUTSIDE, UNSEEN, VOLUME,
+    VOLUME_BALANCE, VOLUME_CORRECTION, VOLUME_DRIFT, VOLUME_DRIFT_RAW, VOLUME_NOW, WITHHELD, WITHHELD_WIRE,
 };
 use crate::shared::attributes::{SINK_RATE, SOURCE_RATE};
 use crate::shared::surface::{SurfaceDetail, surface};
@@ -358,10 +358,15 @@ impl Run {
         let outside = colliders.solid(&solid).map(|solid| self.surface.phi_outside(solid));
         let view = self.surface.level_set().view();
         let phi = outside.as_deref().unwrap_or(view.phi);
-        let volume = volume(PhiView { phi, ..view }, lattice.refined(by), &velocity, bounds, lattice)?;
+        let volume = volume(PhiView { phi, ..view }, lattice.refined(by), &velocity, pace(cx), bounds, lattice)?;
         let volume = Arc::new(volume);
         Ok(self.volume.get_or_init(|| volume).clone())
     }
+}
+
+/// Simulated seconds per second of the scene: what makes velocities of the scene of those of the simulation.
+pub(super) fn pace(cx: &Cx) -> f32 {
+    cx.get(TIME_SCALE) as f32
 }
 
 /// A share of a volume in per cent, without its sign; 0 of none.

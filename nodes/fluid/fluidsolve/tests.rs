@@ -142,6 +142,37 @@ fn time_stops_and_goes_on() {
     assert!(heights[1] > heights[2] && heights[5] > heights[6] && heights[6] > heights[7], "{heights:?}");
 }
 
+/// What moves 0.5 m in a second of the scene has that velocity, whatever `time_scale` is: liquid and tracers that fly
+/// freely, and liquid that a collider pushes.
+#[test]
+fn velocities_are_per_second_of_the_scene() {
+    for pace in [0.5, 2.0] {
+        let bench = solving(ball([0.3, 0.5, 0.5], 0.2))
+            .input(TRACERS, Component::points(vec![[0.3, 0.5, 0.5]]))
+            .set(GRAVITY, [0.0; 3])
+            .set(INITIAL_VELOCITY, [0.5 / pace, 0.0, 0.0])
+            .set(TIME_SCALE, pace);
+        let [from, to] = [1, 7].map(|frame| carried::particles_at(&bench, frame));
+        let tracer = |particles: &Component| particles.positions().last().copied().unwrap();
+        assert!((tracer(&to)[0] - tracer(&from)[0] - 0.125).abs() < 1e-4, "{pace}");
+        for particles in [from, to] {
+            for v in particles.get(V).unwrap() {
+                assert!((v[0] - 0.5).abs() < 1e-3 && v[1].abs() + v[2].abs() < 1e-3, "{pace}: {v:?}");
+            }
+        }
+        // A plate pushes a block that is nearly rigid, at 0.6 m/s.
+        let plate = |x: f32| cuboid([x - 0.2, -0.1, -0.1], [x, 1.1, 1.1]);
+        let pushed = solving(cuboid([0.2, 0.3, 0.3], [0.5, 0.7, 0.7]))
+            .moving(COLLIDERS, move |frame| plate(0.2 + 0.025 * (frame.number() as f32 - 1.0)).into())
+            .set(GRAVITY, [0.0; 3])
+            .set(VISCOSITY, 1e6)
+            .set(TIME_SCALE, pace);
+        let geometry = volume_at(&pushed, 3);
+        let v = geometry.volume().unwrap().sampler().velocity([0.4, 0.5, 0.5]);
+        assert!((v[0] - 0.6).abs() < 0.01, "{pace}: {v:?}");
+    }
+}
+
 #[test]
 fn gravity_turns_within_a_frame() {
     // Half of the frame down, half up: at the end it does not fall, but has fallen g (T/2)² in that frame.
