@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::carried::CarriedColumns;
 use super::domain::{checks, domain, lattice, settings};
-use super::measured::{euler_characteristic, measured, pool_of};
+use super::measured::{centre_of_mass, euler_characteristic, liquid_cells, measured};
 use super::openings::{Opening, SINK, SOURCE, Timed};
 use super::particles::particles;
 use super::shapes::{Colliders, in_cells};
@@ -86,8 +86,11 @@ impl Chain for Run {
             surface.meet(&|point| colliders.distance(1.0, point));
         }
         let [velocity, spin] = [INITIAL_VELOCITY, INITIAL_SPIN].map(|param| cx.get(param).map(|x| x as f32));
-        let density = |place: [f32; 3]| start.material(place).density.map_or(cx.get(DENSITY), f64::from);
-        let centre = pool_of(&surface, density).centre;
+        let density = |place: [f32; 3]| match colliders.distance(1.0, place) >= 0.0 {
+            true => start.material(place).density.map_or(cx.get(DENSITY), f64::from),
+            false => 0.0,
+        };
+        let centre = if spin == [0.0; 3] { spin } else { centre_of_mass(&surface, density) };
         let side = lattice.cell as f32;
         let at = |point: [f32; 3]| add(velocity, cross(spin, scale(sub(point, centre), side)));
         let distance = |_: f64, point: [f32; 3]| colliders.distance(1.0, point);
@@ -142,7 +145,7 @@ impl Chain for Run {
             colliders: Some(colliders),
             volume: OnceLock::new(),
         };
-        run.metrics.set(LIQUID_CELLS, pool_of(&run.surface, |_| 1.0).cells as f64);
+        run.metrics.set(LIQUID_CELLS, liquid_cells(&run.surface) as f64);
         Ok(run)
     }
 

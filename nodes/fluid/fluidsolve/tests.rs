@@ -43,6 +43,11 @@ fn metric(out: &BenchResult, metric: Metric) -> f64 {
 
 /// The height of the centre of what a surface encloses.
 fn height(out: &BenchResult) -> f64 {
+    centre(out, 1)
+}
+
+/// Where that centre is along an axis.
+fn centre(out: &BenchResult, axis: usize) -> f64 {
     let points = out.mesh().positions();
     let (mut moment, mut volume) = (0.0, 0.0);
     for quad in out.mesh().faces().unwrap().corners.as_chunks::<4>().0 {
@@ -50,7 +55,7 @@ fn height(out: &BenchResult) -> f64 {
             let [a, b, c] = corners.map(|corner| points[corner as usize]);
             let six = numerics::volume::six_volumes([[0.0; 3], a, b, c]);
             volume += six;
-            moment += six * f64::from(a[1] + b[1] + c[1]) / 4.0;
+            moment += six * f64::from(a[axis] + b[axis] + c[axis]) / 4.0;
         }
     }
     moment / volume
@@ -140,6 +145,38 @@ fn time_stops_and_goes_on() {
     assert_eq!(out[3].mesh().positions().len(), out[4].mesh().positions().len());
     assert!(heights[3] == heights[4] && metric(&out[4], SUBSTEPS_USED) == 0.0, "{heights:?}");
     assert!(heights[1] > heights[2] && heights[5] > heights[6] && heights[6] > heights[7], "{heights:?}");
+}
+
+/// Spin is about the centre of mass, wherever that is on the grid: it stays where it is.
+#[test]
+fn spin_at_the_start_gives_no_net_momentum() {
+    let bar = |turn: f64| {
+        let mut bar = cuboid([-0.25, -0.1, -0.075], [0.25, 0.1, 0.075]);
+        let (sine, cosine) = (turn.sin() as f32, turn.cos() as f32);
+        let place = |[x, y, z]: [f32; 3]| [0.5362 + cosine * x - sine * y, 0.5 + sine * x + cosine * y, 0.5 + z];
+        bar.edit(P).into_iter().flatten().for_each(|p| *p = place(*p));
+        bar
+    };
+    let spin = |liquid: Component, cell: f64, viscosity: f64| {
+        let spinning = solving(liquid).set(CELL, cell).set(GRAVITY, [0.0; 3]).set(VISCOSITY, viscosity);
+        spinning.set(INITIAL_SPIN, [0.0, 0.0, 4.0])
+    };
+    let place = [0.5362, 0.5, 0.5];
+    for (liquid, cell) in [(ball(place, 0.15), 1.0 / 16.0), (bar(0.576), 1.0 / 16.0), (bar(0.576), 1.0 / 32.0)] {
+        let out = spin(liquid, cell, 1.0).cook();
+        let velocity = out.mesh().get(V).unwrap();
+        let axis = [0, 1].map(|k| {
+            let across = |v: &[f32; 3]| f64::from(if k == 0 { v[1] } else { -v[0] }) / 4.0;
+            let places = out.mesh().positions().iter().zip(velocity).map(|(p, v)| f64::from(p[k]) - across(v));
+            places.sum::<f64>() / velocity.len() as f64
+        });
+        for (found, exact) in axis.iter().zip(place) {
+            assert!((found - f64::from(exact)).abs() < 0.02 * cell, "{cell}: {axis:?}");
+        }
+    }
+    let out = spin(ball(place, 0.15), 1.0 / 16.0, 1e5).frames([1, 13]);
+    let moved = [0, 1, 2].map(|axis| centre(&out[1], axis) - centre(&out[0], axis));
+    assert!(moved.iter().all(|way| way.abs() < 1e-3), "{moved:?}");
 }
 
 /// What moves 0.5 m in a second of the scene has that velocity, whatever `time_scale` is: liquid and tracers that fly
