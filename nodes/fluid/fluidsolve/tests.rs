@@ -268,6 +268,21 @@ fn a_source_adds_the_integral_of_its_rate() {
     assert!(metric(&out[3], SOURCED) < 1e-3 * exact);
 }
 
+/// Faster than its velocity carries it away: what is more than that comes out of its liquid.
+#[test]
+fn a_nozzle_gives_three_times_what_its_velocity_carries() {
+    let mut nozzle = with(cuboid([0.15, 0.35, 0.35], [0.25, 0.65, 0.65]), &[(SOURCE_RATE, 0.27)]);
+    nozzle.set(SOURCE_VELOCITY, vec![[1.0, 0.0, 0.0]]).unwrap();
+    let out = solving(cuboid([3.0; 3], [4.0; 3])).input(SOURCES, nozzle).set(GRAVITY, [0.0; 3]).frames(1..=7);
+    for (n, frame) in out.iter().enumerate().skip(1) {
+        let (sourced, exact) = (metric(frame, SOURCED), 0.27 * n as f64 * H);
+        assert!((sourced - exact).abs() < 1e-6 * 0.27 * H, "{n}: {sourced} of {exact}");
+        assert!(metric(frame, WITHHELD) == 0.0, "{n}: {}", metric(frame, WITHHELD));
+    }
+    let balance = metric(&out[6], VOLUME_BALANCE);
+    assert!(balance.abs() < 0.02, "{balance}");
+}
+
 #[test]
 fn a_sink_takes_what_its_rate_says_or_all_that_enters() {
     let pool = || solving(cuboid([-1.0; 3], [2.0, 0.5, 2.0]));
@@ -278,11 +293,12 @@ fn a_sink_takes_what_its_rate_says_or_all_that_enters() {
         sink.set(SINK_ACTIVE, vec![i32::from(frame < 9.0)]).unwrap();
         sink
     };
-    // What a substep asks for passes in the next.
     let out = pool().moving(SINKS, move |frame| off(frame.number()).into()).frames(1..=10);
     let (sunk, exact) = (metric(&out[9], SUNK), 0.1 * 8.0 * H);
     let lost = metric(&out[0], VOLUME_NOW) - metric(&out[9], VOLUME_NOW);
-    assert!((sunk / exact - 1.0).abs() < 0.01, "{sunk} of {exact}");
+    assert!((sunk / exact - 1.0).abs() < 1e-6, "{sunk} of {exact}");
+    let first = metric(&out[1], SUNK) / (0.1 * H);
+    assert!((first - 1.0).abs() < 1e-6, "{first} of what the rate takes in the first frame");
     assert!((lost / exact - 1.0).abs() < 0.05, "{lost} of {exact}");
     let out = pool().input(SINKS, drain).frames(1..=9);
     let (sunk, lost) = (metric(&out[8], SUNK), metric(&out[0], VOLUME_NOW) - metric(&out[8], VOLUME_NOW));

@@ -134,9 +134,7 @@ impl Motion {
 
     /// The largest component of the velocity, m/s.
     pub(super) fn largest_speed(&self) -> f64 {
-        let largest =
-            |field: &Vec<f32>| field.iter().fold(0.0_f32, |most, u| if u.abs() > most { u.abs() } else { most });
-        self.velocity.faces().iter().map(largest).fold(0.0, |most, u| f64::from(u).max(most))
+        self.velocity.faces().iter().map(|field| largest(field)).fold(0.0, |most, u| f64::from(u).max(most))
     }
 
     /// What no more than one in `rare` components of the velocity exceeds, but at least the largest ÷ `most`, m/s.
@@ -193,6 +191,11 @@ impl Motion {
             faces
         })
     }
+}
+
+/// The largest number of a field, without its sign.
+fn largest(field: &[f32]) -> f32 {
+    field.iter().fold(0.0_f32, |most, u| if u.abs() > most { u.abs() } else { most })
 }
 
 /// Nothing flows through closed walls, where the faces of the liquid have not said so.
@@ -289,6 +292,11 @@ impl LiquidCells {
         images.fill(&mut moving);
         images.fill(&mut known);
         Self { count: liquid.len(), rows, level_set, outside, open, solid_velocity, moving, known, images }
+    }
+
+    /// The largest component of the velocity of a solid at the faces that it covers in part, m/s.
+    pub(super) fn largest_solid_speed(&self) -> f64 {
+        self.solid_velocity.iter().flatten().map(|u| f64::from(largest(u))).fold(0.0, f64::max)
     }
 
     /// φ on wider rows.
