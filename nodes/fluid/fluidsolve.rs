@@ -131,7 +131,8 @@ params! { PARAMS:
         "Number of surface cells per edge of a cell: 2 keeps finer surface detail; the motion is the same.")
         .within(1.0, 4.0).fixed();
     TIME_SCALE: Param<f64> = Param::double("time_scale", 1.0,
-        "Simulated seconds per second of the scene: 0.5 is slow motion, 0 stops time.").at_least(0.0).soft(0.0, 2.0).history();
+        "Simulated seconds per second of the scene: 0.5 is slow motion, 0 stops time. Velocities, spin and rates in params and \
+         sources are per simulated second; `v` and the velocity in `volume` are per second of the scene.").at_least(0.0).soft(0.0, 2.0).history();
 }
 
 const SURFACE: Output = Output::new(

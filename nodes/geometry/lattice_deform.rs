@@ -56,7 +56,7 @@ params! { PARAMS:
     OFFSETS: Param<Arc<Vec<[f32; 3]>>> = Param::vec3s("offsets",
         "How far each control point is moved from its place in the box, in metres: a list of vectors, one per control \
          point, ordered so that x varies fastest, then y, then z. If empty, nothing moves. Keys are interpolated \
-         linearly.");
+         linearly; their lists are equally long.");
     BASIS: Param<BasisChoice> = Param::choice("basis", LatticeBasis::Bernstein,
         "How the deformation is interpolated between control points. With one division along each axis both are the \
          same.").when(bends);

@@ -183,6 +183,8 @@ pub mod code {
         KEYFRAMES_UNORDERED = "keyframes-unordered";
         /// Two keyframes at one frame.
         KEYFRAMES_DOUBLED = "keyframes-doubled";
+        /// Keyframes of lists that are not of one length.
+        KEYFRAMES_LENGTHS = "keyframes-lengths";
         /// Invalid ramp keys.
         RAMP = "ramp";
         /// An invalid expression.

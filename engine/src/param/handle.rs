@@ -440,7 +440,7 @@ impl Param<Arc<Ramp>> {
 }
 
 impl Param<Arc<Vec<[f32; 3]>>> {
-    /// A list of vectors, empty by default. Keys with lists of equal length are interpolated.
+    /// A list of vectors, empty by default. Keys are interpolated; their lists are of equal length.
     pub const fn vec3s(name: &'static str, help: &'static str) -> Self {
         Self::new(name, (), help)
     }

@@ -95,6 +95,16 @@ pub enum Value {
 }
 
 impl Value {
+    /// Numbers of rows that keep two lists from being interpolated one by one.
+    pub(crate) fn different_lengths(&self, other: &Self) -> Option<[usize; 2]> {
+        let lengths = match (self, other) {
+            (Self::Vec3s(a), Self::Vec3s(b)) => [a.len(), b.len()],
+            (Self::Ramp(a), Self::Ramp(b)) => [a.keys().len(), b.keys().len()],
+            _ => return None,
+        };
+        (lengths[0] != lengths[1]).then_some(lengths)
+    }
+
     /// Adds this value to a hash.
     pub fn add_to(&self, key: &mut Hasher) {
         match self {

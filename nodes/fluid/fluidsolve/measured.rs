@@ -1,6 +1,7 @@
 //! What is measured of the liquid, as metrics.
 
 use engine::prelude::*;
+use liquid::level_set::PhiSampler;
 use liquid::marked::MarkedSurface;
 use liquid::step::{LiquidReport, Surface};
 
@@ -30,27 +31,48 @@ pub(super) fn measured(metrics: &mut MetricValues, report: &LiquidReport) {
     }
 }
 
-/// Where liquid is, in solver cells.
-pub(super) struct Pool {
-    /// The centre of mass; 0 where there is no liquid.
-    pub(super) centre: [f32; 3],
-    /// Number of cells.
-    pub(super) cells: usize,
+/// Number of cells of a surface, in solver cells, whose middle is in the liquid.
+pub(super) fn liquid_cells(surface: &MarkedSurface) -> usize {
+    let view = surface.view();
+    let is_in = |cell: [i32; 3]| (0..3).all(|k| view.low[k] <= cell[k] && cell[k] < view.high[k]);
+    view.rows.iter().zip(view.phi).filter(|(cell, phi)| **phi < 0.0 && is_in(*cell)).count()
 }
 
-/// The cells of a surface whose middle is in the liquid, of this density at a place in cells.
-pub(super) fn pool_of(surface: &MarkedSurface, density: impl Fn([f32; 3]) -> f64) -> Pool {
-    let view = surface.view();
-    let (mut sum, mut mass, mut cells) = ([0.0; 3], 0.0, 0_usize);
-    for (at, cell) in view.rows.iter().enumerate() {
-        if view.phi[at] < 0.0 && (0..3).all(|k| view.low[k] <= cell[k] && cell[k] < view.high[k]) {
-            cells += 1;
-            let own = density(cell.map(|x| x as f32 + 0.5));
-            mass += own;
-            (0..3).for_each(|k| sum[k] += own * (f64::from(cell[k]) + 0.5));
+/// Parts along the side of a cell that the surface may cut, for its mass.
+const PARTS: i32 = 4;
+/// Distance from the surface, in cells, from which on it does not.
+const UNCUT: f32 = 1.0;
+
+/// The centre of mass of what a surface encloses, in solver cells, of this density at a place; 0 where there is no liquid.
+pub(super) fn centre_of_mass(surface: &MarkedSurface, density: impl Fn([f32; 3]) -> f64) -> [f32; 3] {
+    let view = surface.level_set().view();
+    let unit = 1.0 / f64::from(surface.resolution());
+    let mut sampler = PhiSampler::new(view);
+    let (mut moment, mut mass) = ([0.0; 3], 0.0);
+    let mut add = |place: [f64; 3], volume: f64| {
+        let place = place.map(|x| x * unit);
+        let own = volume * density(place.map(|x| x as f32));
+        mass += own;
+        (0..3).for_each(|k| moment[k] += own * place[k]);
+    };
+    let is_in = |cell: [i32; 3]| (0..3).all(|k| view.low[k] <= cell[k] && cell[k] < view.high[k]);
+    for (at, cell) in view.rows.iter().enumerate().filter(|(_, cell)| is_in(*cell)) {
+        let side = if view.phi[at].abs() < UNCUT { PARTS } else { 1 };
+        if side == 1 && view.phi[at] >= 0.0 {
+            continue;
+        }
+        for n in 0..side * side * side {
+            let part = [n % side, n / side % side, n / (side * side)];
+            let share = |k: usize| (f64::from(part[k]) + 0.5) / f64::from(side);
+            let place = [0, 1, 2].map(|k| f64::from(cell[k]) + share(k));
+            let phi = f64::from(sampler.at(place.map(|x| x as f32))) * f64::from(side);
+            let filled = (0.5 - phi).clamp(0.0, 1.0);
+            if filled > 0.0 {
+                add(place, filled / f64::from(side * side * side));
+            }
         }
     }
-    Pool { centre: sum.map(|x| if cells > 0 { (x / mass) as f32 } else { 0.0 }), cells }
+    moment.map(|x| if mass > 0.0 { (x / mass) as f32 } else { 0.0 })
 }
 
 /// Points − edges + faces of a closed mesh of quads, in which two quads share each edge.

@@ -1,10 +1,11 @@
 //! The markers on the surface, the spray and the tracers, as points.
 
 use engine::prelude::*;
-use liquid::step::Motion;
+use liquid::step::{Motion, Surface};
 use numerics::vector::scale;
 
-use super::run::Run;
+use super::domain::domain;
+use super::run::{Run, pace};
 use super::{DENSITY, VISCOSITY};
 use crate::shared::attributes::{
     PARTICLE_DENSITY, PARTICLE_KIND, PARTICLE_MARKER, PARTICLE_SPRAY, PARTICLE_TRACER, PARTICLE_VISCOSITY,
@@ -33,8 +34,10 @@ pub(super) fn particles(cx: &Cx, run: &Run, lattice: Lattice, volume: &Volume) -
     points.extend(tracers.points().iter().map(|place| lattice.in_metres(*place)));
     let velocity = cx.wants(V).then(|| {
         let mut velocity = velocity_at(volume, &points[..on_surface]);
-        velocity.extend(run.spray.iter().map(|drop| drop.velocity));
-        velocity.extend(velocity_at(volume, &points[first_tracer..]));
+        velocity.extend(run.spray.iter().map(|drop| scale(drop.velocity, pace(cx))));
+        let carried = tracers.carried(run.surface.view(), &domain(cx));
+        let of_tracers = velocity_at(volume, &points[first_tracer..]).into_iter().zip(carried);
+        velocity.extend(of_tracers.map(|(velocity, is_carried)| if is_carried { velocity } else { [0.0; 3] }));
         velocity
     });
     let count = points.len();

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use super::carried::CarriedColumns;
 use super::domain::{checks, domain, lattice, settings};
-use super::measured::{euler_characteristic, measured, pool_of};
+use super::measured::{centre_of_mass, euler_characteristic, liquid_cells, measured};
 use super::openings::{Opening, SINK, SOURCE, Timed};
 use super::particles::{particle_count, particles};
 use super::shapes::{Colliders, in_cells};
@@ -25,8 +25,8 @@ use super::start::liquid_at_start;
 use super::{
     CFL_REACHED, COLLECTING, DENSITY, EULER_CHARACTERISTIC, FAST_SHAPES, IN_COLLIDERS, INITIAL_SPIN, INITIAL_VELOCITY,
     LEFT_DOMAIN, LIQUID_CELLS, MADE_GOOD, MADE_GOOD_NOW, MATERIAL_DRIFT, MISWIRED, OUTSIDE, PARTICLES, PARTICLES_NOW,
-    SINKS, SOURCED, SOURCES, SPRAY, SUNK, SURFACE, TRACERS, TRACERS_OUTSIDE, UNSEEN, VOLUME, VOLUME_BALANCE,
-    VOLUME_CORRECTION, VOLUME_DRIFT, VOLUME_DRIFT_RAW, VOLUME_NOW, WITHHELD, WITHHELD_WIRE,
+    SINKS, SOURCED, SOURCES, SPRAY, SUNK, SURFACE, TIME_SCALE, TRACERS, TRACERS_OUTSIDE, UNSEEN, VOLUME,
+    VOLUME_BALANCE, VOLUME_CORRECTION, VOLUME_DRIFT, VOLUME_DRIFT_RAW, VOLUME_NOW, WITHHELD, WITHHELD_WIRE,
 };
 use crate::shared::attributes::{SINK_RATE, SOURCE_RATE};
 use crate::shared::surface::{SurfaceDetail, surface};
@@ -83,8 +83,11 @@ impl Chain for Run {
             surface.meet(&|point| colliders.distance(1.0, point));
         }
         let [velocity, spin] = [INITIAL_VELOCITY, INITIAL_SPIN].map(|param| cx.get(param).map(|x| x as f32));
-        let density = |place: [f32; 3]| start.material(place).density.map_or(cx.get(DENSITY), f64::from);
-        let centre = pool_of(&surface, density).centre;
+        let density = |place: [f32; 3]| match colliders.distance(1.0, place) >= 0.0 {
+            true => start.material(place).density.map_or(cx.get(DENSITY), f64::from),
+            false => 0.0,
+        };
+        let centre = if spin == [0.0; 3] { spin } else { centre_of_mass(&surface, density) };
         let side = lattice.cell as f32;
         let at = |point: [f32; 3]| add(velocity, cross(spin, scale(sub(point, centre), side)));
         let distance = |_: f64, point: [f32; 3]| colliders.distance(1.0, point);
@@ -138,7 +141,7 @@ impl Chain for Run {
             start: start_metrics,
             colliders: Some(colliders),
         };
-        run.metrics.set(LIQUID_CELLS, pool_of(&run.surface, |_| 1.0).cells as f64);
+        run.metrics.set(LIQUID_CELLS, liquid_cells(&run.surface) as f64);
         Ok(run)
     }
 
@@ -356,8 +359,14 @@ impl Run {
         let outside = colliders.solid(&solid).map(|solid| self.surface.phi_outside(solid));
         let view = self.surface.level_set().view();
         let phi = outside.as_deref().unwrap_or(view.phi);
-        Ok(Arc::new(volume(PhiView { phi, ..view }, lattice.refined(by), &velocity, bounds, lattice)?))
+        let volume = volume(PhiView { phi, ..view }, lattice.refined(by), &velocity, pace(cx), bounds, lattice)?;
+        Ok(Arc::new(volume))
     }
+}
+
+/// Simulated seconds per second of the scene: what makes velocities of the scene of those of the simulation.
+pub(super) fn pace(cx: &Cx) -> f32 {
+    cx.get(TIME_SCALE) as f32
 }
 
 /// A share of a volume in per cent, without its sign; 0 of none.

@@ -44,7 +44,8 @@ fn size(low: Cell, high: Cell) -> [u32; 3] {
     [0, 1, 2].map(|k| high[k].saturating_sub(low[k]).max(0) as u32)
 }
 
-/// The volume of a level set and a velocity, each on the smallest box of its own cells that holds it.
+/// The volume of a level set and a velocity, each on the smallest box of its own cells that holds it. The velocity is
+/// multiplied by `pace`.
 ///
 /// # Errors
 /// Where a box is too long for a volume.
@@ -52,6 +53,7 @@ pub(crate) fn volume(
     level_set: PhiView<'_>,
     level_lattice: Lattice,
     velocity: &MacVelocity,
+    pace: f32,
     bounds: [Cell; 2],
     lattice: Lattice,
 ) -> Result<Volume> {
@@ -62,7 +64,7 @@ pub(crate) fn volume(
     let moving = boxed(velocity.rows(), bounds);
     let face = |axis: usize| {
         let beyond = [0, 1, 2].map(|k| i32::from(k == axis));
-        field(velocity.rows(), &velocity.faces()[axis], moving, beyond, 0.0, |u| u)
+        field(velocity.rows(), &velocity.faces()[axis], moving, beyond, 0.0, |u| pace * u)
     };
     let faces = [face(0)?, face(1)?, face(2)?];
     Ok(Volume::from_fields(level_lattice.grid(within), phi, lattice.grid(moving), faces)?)

@@ -223,9 +223,19 @@ impl<'a> Reader<'a, '_> {
         let Keys { keys, interpolation } = keys(json, between, self.faults)?;
         let values: Vec<Option<(f64, Value)>> =
             keys.iter().map(|(frame, json)| Some((*frame, self.key(spec, json)?))).collect();
-        let keys: Vec<(f64, Value)> = values.into_iter().collect::<Option<_>>()?;
+        let values: Vec<(f64, Value)> = values.into_iter().collect::<Option<_>>()?;
         // Seeds cannot be interpolated.
         let interpolation = if spec.shape == Shape::Seed { Interpolation::Constant } else { interpolation };
+        if interpolation != Interpolation::Constant {
+            for (pair, (_, json)) in values.windows(2).zip(&keys[1..]) {
+                let Some([before, own]) = pair[0].1.different_lengths(&pair[1].1) else { continue };
+                let fact = format!("the list has length {own}, that of the key at frame {} length {before}", pair[0].0);
+                let hint = "rows are interpolated one by one: write as many in each key, or set `interpolation` to \"constant\"";
+                self.faults.push(json.fault(code::KEYFRAMES_LENGTHS, fact).hint(hint));
+                return None;
+            }
+        }
+        let keys = values;
         let source = Source::Keys(Arc::new(Keyframes { keys, interpolation }), spec.shape);
         match source.is_animated() {
             true => Some(source),

@@ -218,10 +218,15 @@ impl MaterialPoints {
         let rows = CellRows::from_cells(&stir.cells);
         let gained = stir.rate * seconds / (cell * cell * cell * rows.len().max(1) as f64);
         let share = gained / (1.0 + gained);
-        let key = Key::new(SEED).of(self.next_round());
-        for (n, (point, own)) in self.points.iter().zip(&mut self.values).enumerate() {
-            if rows.find(point.map(floor)).is_some() && key.of(n as u64).f64() < share {
-                *own = stir.value;
+        // Evenly through their order, from a random one on: as many as that, whatever chance would make of it.
+        let mut due = Key::new(SEED).of(self.next_round()).f64();
+        for (point, own) in self.points.iter().zip(&mut self.values) {
+            if rows.find(point.map(floor)).is_some() {
+                due += share;
+                if due >= 1.0 {
+                    due -= 1.0;
+                    *own = stir.value;
+                }
             }
         }
     }

@@ -50,13 +50,18 @@ impl TracerPoints {
         &self.numbers
     }
 
+    /// Which of them a liquid carries; others stay where they are, whatever the velocity there is.
+    pub fn carried(&self, view: PhiView<'_>, domain: &Domain) -> Vec<bool> {
+        let is_carried = |sampler: &mut PhiSampler<'_>, n: usize| is_carried(sampler, self.points[n], domain);
+        parallel::tabulate_with(self.points.len(), CHUNK, || PhiSampler::new(view), is_carried)
+    }
+
     /// Moves those that are in the liquid or next to it; others stay. What leaves through an open wall is dropped.
     pub(crate) fn advance(&mut self, flow: &Moving<'_>, view: PhiView<'_>, domain: &Domain) {
-        let is_carried = |sampler: &mut PhiSampler<'_>, point: Vec3| sampler.at(point) < CARRIED;
         parallel::for_each(self.points.chunks_mut(CHUNK), |_, points| {
             let (mut way, mut sampler) = (flow.reader(), PhiSampler::new(view));
-            for point in points.iter_mut().filter(|point| is_outside(**point, domain).is_none()) {
-                if is_carried(&mut sampler, *point) {
+            for point in points {
+                if is_carried(&mut sampler, *point, domain) {
                     let moved = displacement(&mut way, *point);
                     let moved = flow.held(*point, moved, 1.0).map_or(moved, |held| held.way);
                     *point = kept_in(add(*point, moved), domain);
@@ -71,6 +76,11 @@ impl TracerPoints {
             self.numbers.retain(|_| number.next() == Some(&true));
         }
     }
+}
+
+/// Whether the liquid carries a tracer at a place: it is in the liquid or next to it.
+fn is_carried(sampler: &mut PhiSampler<'_>, point: Vec3, domain: &Domain) -> bool {
+    is_outside(point, domain).is_none() && sampler.at(point) < CARRIED
 }
 
 /// The wall that a place is beyond.

@@ -10,6 +10,8 @@ use crate::level_set::{PhiSampler, PhiView};
 const START: f32 = 0.5;
 /// The shortest step of the search, cells.
 const SHORTEST: f32 = 0.25;
+/// Part of a normal that is rounding, where it should be along a wall.
+const ALONG: f32 = 1e-3;
 /// Steps after which a vertex gets the distance that was reached.
 const MOST_STEPS: usize = 4096;
 /// Vertices that one thread handles at a time.
@@ -23,8 +25,17 @@ impl QuadMesh {
     }
 }
 
+/// A normal without what leads the way along it out of a wall that the point is on, where that is rounding.
+fn along_walls(view: PhiView<'_>, point: Vec3, normal: Vec3) -> Vec3 {
+    [0, 1, 2].map(|k| {
+        let wall = if normal[k] > 0.0 { view.low[k] } else { view.high[k] } as f32;
+        if point[k] == wall && normal[k].abs() < ALONG { 0.0 } else { normal[k] }
+    })
+}
+
 /// Goes into the liquid by |φ| at a time (sphere tracing: Hart 1996) until it is outside, or leaves the domain.
 fn behind(sampler: &mut PhiSampler<'_>, view: PhiView<'_>, point: Vec3, normal: Vec3) -> f32 {
+    let normal = along_walls(view, point, normal);
     let at = |way: f32| sub(point, scale(normal, way));
     let is_within = |p: Vec3| (0..3).all(|k| view.low[k] as f32 <= p[k] && p[k] <= view.high[k] as f32);
     let (mut before, mut inside) = (0.0, 0.0);
@@ -53,7 +64,7 @@ fn leave(view: PhiView<'_>, point: Vec3, normal: Vec3, way: f32) -> f32 {
         let wall = if normal[k] > 0.0 { view.low[k] } else { view.high[k] } as f32;
         let there = (point[k] - wall) / normal[k];
         if there >= 0.0 && there < least {
-            least = there;
+            least = there.abs();
         }
     }
     least
@@ -62,7 +73,7 @@ fn leave(view: PhiView<'_>, point: Vec3, normal: Vec3, way: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use crate::extract::{Placement, extract};
-    use crate::level_set::{BAND, LevelSet};
+    use crate::level_set::{BAND, LevelSet, PhiSampler};
     use crate::rows::CellRows;
     use numerics::vector::length;
 
@@ -104,5 +115,23 @@ mod tests {
         let thickness = mesh.thickness(pool.view());
         let up = mesh.normals.iter().zip(&thickness).filter(|(n, _)| n[1] > 0.999);
         assert!(up.clone().count() > 400 && up.into_iter().all(|(_, t)| (t - 5.25).abs() < 0.05));
+    }
+
+    /// Where a level surface meets walls, rounding must not send the way out of them.
+    #[test]
+    fn a_pool_is_as_thick_at_its_rim() {
+        let pool = set(|[_, y, _]| y - 5.25);
+        let normals = [[7e-7, 1.0, -7e-7], [-7e-7, 1.0, 7e-7], [1e-9, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        for point in [[0.0, 5.25, 24.0], [24.0, 5.25, 24.0], [0.0, 5.25, 0.0], [0.0, 5.25, 11.5]] {
+            for normal in normals {
+                let thickness = super::behind(&mut PhiSampler::new(pool.view()), pool.view(), point, normal);
+                assert!((thickness - 5.25).abs() < 1e-3, "{point:?} {normal:?}: {thickness}");
+            }
+        }
+        // A normal that leans into the wall leads out of the liquid at once: 0, without a sign.
+        for normal in [[0.6, 0.8, 0.0], [0.8, -0.6, 0.0]] {
+            let thickness = super::behind(&mut PhiSampler::new(pool.view()), pool.view(), [0.0, 5.25, 11.5], normal);
+            assert_eq!(thickness.to_bits(), 0, "{thickness}");
+        }
     }
 }

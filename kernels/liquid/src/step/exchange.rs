@@ -13,12 +13,15 @@ use crate::step::motion::{LiquidCells, Motion};
 use crate::step::part::{Ellipsoid, LEAST, Part};
 use crate::step::pour::{Holder, Pour};
 use crate::step::shape_cells::ShapeCells;
-use crate::step::sources::{FlowAccount, LiquidSink, LiquidSource, SourceShape, volume_between};
+use crate::step::sources::{Flow, FlowAccount, LiquidSink, LiquidSource, SourceShape, Span};
 use crate::step::{LiquidSettings, Surface, Surroundings};
 use crate::velocity::{FaceFields, MacVelocity, Sampler, Site};
 
 /// What a sink takes in a substep, at most, ÷ the volume of its liquid cells.
 const TAKEN: f64 = 2.0;
+
+/// Share of what a rate gives in a substep that may fill a shape too early.
+const EARLY: f64 = 0.25;
 
 /// Cells around the way of what comes in that its interpolation reaches.
 const AROUND: f32 = 1.5;
@@ -30,13 +33,15 @@ const NEW: f32 = 0.1;
 /// same, and what little is missing of it is filled in each substep.
 const LEAST_STREAM: f64 = 0.8;
 
+/// What a source or a sink asks for between two times.
+type Rate<'a> = Option<&'a (dyn Fn(f64, f64) -> f64 + Sync)>;
+
 /// A substep to sources and sinks.
 pub(super) struct Exchange<'a> {
     pub settings: &'a LiquidSettings,
     pub around: &'a Surroundings<'a>,
     pub solid: Option<Obstacle<'a>>,
-    /// When the substep begins and ends.
-    pub times: [f64; 2],
+    pub span: Span,
 }
 
 /// What sources and sinks want of the rest of a substep.
@@ -55,6 +60,32 @@ struct Entering<'a> {
 }
 
 impl<'a> Exchange<'a> {
+    /// Whether, of what acts within the liquid, something begins with a frame, or its rate is another than was expected at the
+    /// end of the last: what pours is chosen at the end of a substep. The substep is all of the frame here.
+    pub(super) fn changes(&self, surface: &dyn Surface, motion: &Motion) -> bool {
+        let view = surface.view();
+        let is_full = |source: &LiquidSource<'a>, account: &FlowAccount, asked: f64| {
+            let Some(cells) = self.cells(source.shape) else { return false };
+            let phi = cells.level_set(&view);
+            let is_wet = !cells.liquid_cells(&phi).is_empty();
+            is_wet && self.part(&cells, &phi, account.owed, EARLY * asked) == Some(Part::Whole)
+        };
+        let is_wet = |sink: &LiquidSink<'a>| {
+            self.cells(sink.shape).is_some_and(|cells| !cells.liquid_cells(&cells.level_set(&view)).is_empty())
+        };
+        let changes = |rate: Rate<'a>, account: &FlowAccount, would_pour: &dyn Fn(f64) -> bool| {
+            let asked = rate.map_or(0.0, |rate| Flow::of(rate, &self.span).gave);
+            match account.pouring > 0.0 {
+                true => account.is_surprised(asked / self.seconds()),
+                false => asked > 0.0 && would_pour(asked),
+            }
+        };
+        let mut sources = self.around.sources.iter().zip(&motion.sources);
+        let mut sinks = self.around.sinks.iter().zip(&motion.sinks);
+        sources.any(|(source, own)| changes(source.rate, own, &|asked| is_full(source, own, asked)))
+            || sinks.any(|(sink, own)| changes(sink.rate, own, &|_| is_wet(sink)))
+    }
+
     /// Changes the surface, and counts what that and what poured have moved.
     pub(super) fn apply(&self, surface: &mut dyn Surface, motion: &mut Motion) -> Exchanged<'a> {
         let mut exchanged = Exchanged { pours: Vec::new(), entering: Vec::new() };
@@ -78,18 +109,19 @@ impl<'a> Exchange<'a> {
         out: &mut Exchanged<'a>,
     ) {
         let before = account.settle(self.seconds());
-        let gave = self.asked(source.rate, account);
+        let flow = self.asked(source.rate, account);
         let is_active = self.is_active(source.active);
-        if !is_active && account.owed <= 0.0 {
+        let is_given = flow.gave > 0.0 || flow.next > 0.0 || account.owed > 0.0;
+        if !is_active && !is_given {
             return;
         }
         let Some(cells) = self.cells(source.shape) else { return account.withhold_beyond(0.0) };
         let mut phi = cells.level_set(&surface.view());
-        let material = (source.material)(self.times[1]);
-        let velocity = self.imposed(source, &cells, &phi, gave);
+        let material = (source.material)(self.span.times[1]);
+        let velocity = self.imposed(source, &cells, &phi, flow.gave);
         let part = match source.rate {
             None => Some(Part::Whole),
-            Some(_) if account.owed > 0.0 => cells.part_that_adds(&phi, account.owed / self.cell_volume()),
+            Some(_) if is_given => self.part(&cells, &phi, account.owed, EARLY * flow.next * flow.next_seconds),
             Some(_) => None,
         };
         let mut filled = 0.0;
@@ -118,7 +150,7 @@ impl<'a> Exchange<'a> {
         let liquid = cells.liquid_cells(&phi);
         account.place = liquid.first().map_or(account.place, |deepest| Site::Centre.of(*deepest));
         if source.rate.is_some() && part == Some(Part::Whole) {
-            let rate = account.rate_to_pour(gave, filled, before, self.seconds());
+            let rate = account.rate_to_pour(&flow, filled, before);
             match liquid.is_empty() {
                 true => account.withhold_beyond(0.0),
                 false if rate > 0.0 => out.pours.push(Pour::new(Holder::Source(n), liquid, rate).of(material)),
@@ -129,10 +161,21 @@ impl<'a> Exchange<'a> {
         out.entering.push(Entering { cells, is_filled: filled > 0.0, velocity });
     }
 
+    /// The part of a shape to fill, where this is owed, m³. What is missing of all of it may be more by `early`: less pours
+    /// then.
+    fn part(&self, cells: &ShapeCells<'_>, phi: &[f32], owed: f64, early: f64) -> Option<Part> {
+        let part_of = |volume: f64| cells.part_that_adds(phi, volume / self.cell_volume());
+        match part_of(owed + early) {
+            Some(Part::Whole) => Some(Part::Whole),
+            _ if owed > 0.0 => part_of(owed),
+            _ => None,
+        }
+    }
+
     /// The velocity that a source imposes, given what its rate gave in the substep, m³: where that would leave less than the
     /// least piece of its shape that stays liquid, a lower one.
     fn imposed(&self, source: &LiquidSource<'_>, cells: &ShapeCells<'_>, phi: &[f32], gave: f64) -> Option<Vec3> {
-        let velocity = (source.velocity?)(self.times[1]);
+        let velocity = (source.velocity?)(self.span.times[1]);
         let speed = f64::from(length(velocity));
         if gave <= 0.0 || speed <= 0.0 || !cells.adds(phi, Part::Whole) {
             return Some(velocity);
@@ -153,9 +196,9 @@ impl<'a> Exchange<'a> {
     ) -> Option<Pour> {
         let owed = account.owed;
         let before = account.settle(self.seconds());
-        let gave = self.asked(sink.rate, account);
+        let flow = self.asked(sink.rate, account);
         let empties = sink.rate.is_none() && self.is_active(sink.active);
-        if !empties && account.owed <= 0.0 {
+        if !empties && flow.gave <= 0.0 && flow.next <= 0.0 && account.owed <= 0.0 {
             return None;
         }
         let Some(cells) = self.cells(sink.shape) else {
@@ -175,30 +218,34 @@ impl<'a> Exchange<'a> {
             return None;
         }
         let most = TAKEN * liquid.len() as f64 * self.cell_volume();
-        account.withhold_beyond(if liquid.is_empty() { 0.0 } else { most.max(gave).max(owed) });
-        let rate = account.rate_to_pour(gave, 0.0, before, self.seconds()).min(most / self.seconds());
+        account.withhold_beyond(if liquid.is_empty() { 0.0 } else { most.max(flow.gave).max(owed) });
+        let rate = account.rate_to_pour(&flow, 0.0, before).min(most / self.span.next_seconds);
         (rate > 0.0).then(|| Pour::new(Holder::Sink(n), liquid, -rate))
     }
 
-    /// Adds what a rate asks for to its account; returns it, m³.
-    fn asked(&self, rate: Option<&(dyn Fn(f64, f64) -> f64 + Sync)>, account: &mut FlowAccount) -> f64 {
-        let [from, to] = self.times;
-        let gave = rate.map_or(0.0, |rate| volume_between(rate, from, to));
-        account.asked += gave;
-        account.owed = if rate.is_some() { account.owed + gave } else { 0.0 };
-        gave
+    /// Adds what a rate asks for to its account; returns that.
+    fn asked(&self, rate: Option<&(dyn Fn(f64, f64) -> f64 + Sync)>, account: &mut FlowAccount) -> Flow {
+        let Some(rate) = rate else {
+            account.owed = 0.0;
+            return Flow::default();
+        };
+        let flow = Flow::of(rate, &self.span);
+        account.asked += flow.gave;
+        account.owed += flow.gave;
+        account.expected = flow.next;
+        flow
     }
 
     fn is_active(&self, active: &(dyn Fn(f64) -> bool + Sync)) -> bool {
-        active(0.5 * (self.times[0] + self.times[1]))
+        active(0.5 * (self.span.times[0] + self.span.times[1]))
     }
 
     fn cells(&self, shape: SourceShape<'a>) -> Option<ShapeCells<'a>> {
-        ShapeCells::new(shape, &self.settings.domain, self.solid, self.times[1])
+        ShapeCells::new(shape, &self.settings.domain, self.solid, self.span.times[1])
     }
 
     fn seconds(&self) -> f64 {
-        self.times[1] - self.times[0]
+        self.span.times[1] - self.span.times[0]
     }
 
     fn cell_volume(&self) -> f64 {

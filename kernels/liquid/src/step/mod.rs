@@ -22,7 +22,8 @@
 //! solve a substep.
 //!
 //! A source adds ∫ rate dt from the first substep on: what is missing of its shape is filled, only in the middle where the
-//! rate does not cover all of it, and the rest is divergence of its liquid, one substep later. Liquid enclosed on all sides gives way to no more
+//! rate does not cover all of it, and the rest is divergence of its liquid, which acts in the next substep and is therefore what
+//! the rate will ask for there. A frame with which that begins or ends starts with a substep of no length worth mentioning. Liquid enclosed on all sides gives way to no more
 //! than leaves it elsewhere; the rest is withheld ([`FlowAccount`]). A drop of less than
 //! a cell's radius is collected. Limit: where a jet only 6 cells across leaves the sharp
 //! edge of a shape that is kept full, markers bulge, and it is 7 % too thick.
@@ -55,6 +56,8 @@ pub use outflow::Outflow;
 pub use sources::{AttributeEdit, FlowAccount, LiquidSink, LiquidSource, SourceShape};
 pub use substep::{Moving, Surface, Surroundings};
 
+use self::exchange::Exchange;
+use self::sources::Span;
 use crate::carried::{LiquidMaterial, MaterialPoints, TracerPoints};
 use crate::rows::CellRows;
 use crate::velocity::{MacVelocity, Scheme};
@@ -237,6 +240,17 @@ impl LiquidReport {
 const RARE: usize = 10_000;
 const FASTER: f64 = 2.0;
 
+/// Share of a frame that a substep takes in which pouring begins or ends: it does so at the end of a substep.
+const BEGINNING: f64 = 1e-6;
+
+/// The next substep, s, one of so many equal ones.
+struct Plan {
+    step: f64,
+    count: f64,
+    /// Whether it is longer than the speed asks for.
+    is_capped: bool,
+}
+
 /// A liquid, and all that its next frame depends on.
 #[derive(Clone, Debug)]
 pub struct Liquid<S> {
@@ -306,26 +320,57 @@ impl<S: Surface> Liquid<S> {
         FlowAccount::start_frame(&mut self.motion.sinks, around.sinks.len());
         self.motion.outflow.clear();
         let mut left = seconds;
+        let beginnings = u32::from(self.rates_change(around, seconds) && !(around.cancelled)());
+        if beginnings > 0 {
+            left = seconds - BEGINNING * seconds;
+            let next_seconds = self.plan(around, [seconds - left, seconds], self.settings.max_substeps).step;
+            let span = Span { times: [0.0, seconds - left], next_seconds, ends_frame: false };
+            report.add(&self.substep(around, span, seconds));
+            // What begins at once is no acceleration that goes on.
+            self.motion.gain = None;
+        }
         while left > 0.0 && !(around.cancelled)() {
-            let gravity = (around.gravity)(seconds - left);
-            let longest = self.longest_substep(gravity);
-            let wanted = (left / longest).ceil().max(1.0);
-            let allowed = f64::from(self.settings.max_substeps.saturating_sub(report.substeps).max(1));
-            let is_capped = wanted > allowed;
-            let count = if is_capped { allowed } else { wanted };
-            let step = left / count;
+            let allowed = self.settings.max_substeps.saturating_sub(report.substeps - beginnings);
+            let Plan { step, count, is_capped } = self.plan(around, [seconds - left, seconds], allowed);
             let after = if count > 1.0 { left - step } else { 0.0 };
             let times = [seconds - left, seconds - after];
-            let mut done = substep::substep(&self.settings, &mut self.surface, &mut self.motion, around, times);
+            let span = Span { times, next_seconds: step, ends_frame: after == 0.0 };
+            let mut done = self.substep(around, span, seconds);
             done.caps_hit = u32::from(is_capped);
-            done.solid_force = done.solid_force.map(|force| force * (times[1] - times[0]) / seconds);
             report.add(&done);
             left = after;
         }
+        let accounts = self.motion.sources.iter_mut().chain(&mut self.motion.sinks);
+        accounts.for_each(FlowAccount::end_frame);
         Outflow::merge(&mut self.motion.outflow);
         let moved = |accounts: &[FlowAccount]| accounts.iter().map(|account| account.moved).sum();
         (report.sourced, report.sunk) = (moved(self.sources()), moved(self.sinks()));
         report
+    }
+
+    /// The next of at most `allowed` substeps between two times.
+    fn plan(&self, around: &Surroundings<'_>, [from, to]: [f64; 2], allowed: u32) -> Plan {
+        let (left, allowed) = (to - from, f64::from(allowed.max(1)));
+        let longest = self.longest_substep((around.gravity)(from));
+        let wanted = (left / longest).ceil().max(1.0);
+        let is_capped = wanted > allowed;
+        let count = if is_capped { allowed } else { wanted };
+        Plan { step: left / count, count, is_capped }
+    }
+
+    /// A substep of a frame of `seconds`.
+    fn substep(&mut self, around: &Surroundings<'_>, span: Span, seconds: f64) -> LiquidReport {
+        let mut done = substep::substep(&self.settings, &mut self.surface, &mut self.motion, around, span);
+        done.solid_force = done.solid_force.map(|force| force * (span.times[1] - span.times[0]) / seconds);
+        done
+    }
+
+    /// Whether a source or a sink within the liquid begins or ends with the frame, or its rate jumps.
+    fn rates_change(&self, around: &Surroundings<'_>, seconds: f64) -> bool {
+        let solid = around.solid.map(|solid| solid.at(0.0));
+        let span = Span { times: [0.0, seconds], next_seconds: seconds, ends_frame: true };
+        let frame = Exchange { settings: &self.settings, around, solid, span };
+        seconds > 0.0 && frame.changes(&self.surface, &self.motion)
     }
 
     /// What each source gave in the last frame.

@@ -206,8 +206,12 @@ impl Motion {
 
 /// The largest component of a velocity.
 pub(super) fn largest_of(faces: &FaceFields<f32>) -> f64 {
-    let largest = |field: &Vec<f32>| field.iter().fold(0.0_f32, |most, u| if u.abs() > most { u.abs() } else { most });
-    faces.iter().map(largest).fold(0.0, |most, u| f64::from(u).max(most))
+    faces.iter().map(|field| largest(field)).fold(0.0, |most, u| f64::from(u).max(most))
+}
+
+/// The largest number of a field, without its sign.
+fn largest(field: &[f32]) -> f32 {
+    field.iter().fold(0.0_f32, |most, u| if u.abs() > most { u.abs() } else { most })
 }
 
 /// Nothing flows through closed walls, where the faces of the liquid have not said so.
@@ -304,6 +308,11 @@ impl LiquidCells {
         images.fill(&mut moving);
         images.fill(&mut known);
         Self { liquid, rows, level_set, outside, open, solid_velocity, moving, known, images }
+    }
+
+    /// The largest component of the velocity of a solid at the faces that it covers in part, m/s.
+    pub(super) fn largest_solid_speed(&self) -> f64 {
+        self.solid_velocity.iter().flatten().map(|u| f64::from(largest(u))).fold(0.0, f64::max)
     }
 
     /// φ on wider rows.

@@ -55,9 +55,8 @@ impl Pour {
             motion.stirred.push(Stir::new(self.cells.clone(), self.granted, self.material));
         }
         // What nothing gives way to is not made good later.
-        let share = self.granted / self.wanted;
-        if share < 1.0 - ROUNDING {
-            account.withhold_beyond(share * account.owed);
+        if self.granted / self.wanted < 1.0 - ROUNDING {
+            account.withhold_beyond(0.0);
         }
     }
 

@@ -83,17 +83,24 @@ pub struct FlowAccount {
     pub withheld: f64,
     /// A place in its liquid, in cells: the deepest of its shape.
     pub place: Vec3,
-    /// What its rate asked for and has not passed yet, m³.
+    /// What its rate asked for and has not passed yet, m³; below 0, what has passed too early.
     pub(super) owed: f64,
+    /// What of it is in `moved` already, since it is about to pour.
+    pub(super) advanced: f64,
+    /// What its rate was to be in the next substep, m³/s.
+    pub(super) expected: f64,
     /// What passes as divergence of its liquid, m³/s.
     pub(super) pouring: f64,
     /// What cuts of the surface have added instead of taking it, and those to come have to take first, m³.
     pub(super) gained: f64,
 }
 
-/// Share of the rate by which more or less pours while too much or too little is owed: what a short substep gives must not
-/// be made good within it, since faster liquid makes substeps shorter still.
-const CORRECTION: f64 = 0.25;
+/// Share of what is owed that pours in a substep besides the rate, and of the rate by which more or less pours then, at most:
+/// what a short substep gives must not be made good within it, since faster liquid makes substeps shorter still.
+const CORRECTION: f64 = 0.5;
+
+/// Share of a rate by which it may differ from what was expected, before what pours is chosen anew.
+const SURPRISE: f64 = 0.1;
 
 impl FlowAccount {
     /// Whether a source gave nothing in the last frame because its rate is less than the grid can show: it is collected.
@@ -122,15 +129,27 @@ impl FlowAccount {
         std::mem::take(&mut self.pouring)
     }
 
-    /// The rate to pour at, m³/s, after a substep whose rate `gave` so much, of which `filled` has passed, m³. Pouring acts
-    /// in the next substep, so what one substep gives is always owed.
-    pub(super) fn rate_to_pour(&self, gave: f64, filled: f64, before: f64, seconds: f64) -> f64 {
-        if gave <= 0.0 {
-            return (self.owed / seconds).clamp(0.0, before.max(0.0));
+    /// The rate to pour at in the next substep, m³/s: what the rate will ask for, less what filling the shape will give, and
+    /// part of what is owed.
+    pub(super) fn rate_to_pour(&self, flow: &Flow, filled: f64, before: f64) -> f64 {
+        if flow.gave <= 0.0 && flow.next <= 0.0 {
+            return (self.owed / flow.next_seconds).clamp(0.0, before.max(0.0));
         }
-        let rest = gave - filled;
-        let wanted = rest + CORRECTION * (self.owed - rest);
-        wanted.clamp(0.0, (1.0 + CORRECTION) * gave) / seconds
+        let wanted = flow.next - filled / flow.seconds + CORRECTION * self.owed / flow.next_seconds;
+        wanted.clamp(0.0, (1.0 + CORRECTION) * flow.next.max(flow.gave / flow.seconds))
+    }
+
+    /// Whether its rate from now on, m³/s, is another than was expected when what pours was chosen.
+    pub(super) fn is_surprised(&self, rate: f64) -> bool {
+        (rate - self.expected).abs() > SURPRISE * rate.max(self.expected)
+    }
+
+    /// Counts what is about to pour, and not what poured too early, so that what is counted at the end of a frame is what was
+    /// asked for until then.
+    pub(super) fn end_frame(&mut self) {
+        let advanced = if self.pouring > 0.0 { self.owed } else { self.advanced.min(self.owed) };
+        self.moved += advanced - self.advanced;
+        self.advanced = advanced;
     }
 
     /// Gives up what is owed beyond `most`, m³.
@@ -142,8 +161,50 @@ impl FlowAccount {
     }
 }
 
+/// A substep to what has a rate. Times are since the start of the frame, s.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Span {
+    /// When it begins and ends.
+    pub(super) times: [f64; 2],
+    /// How long the next one is, as far as it is known.
+    pub(super) next_seconds: f64,
+    /// Whether that is in the next frame.
+    pub(super) ends_frame: bool,
+}
+
+/// What a rate asks for in a substep and the next.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Flow {
+    /// In the substep, m³.
+    pub(super) gave: f64,
+    /// In the next, m³/s.
+    pub(super) next: f64,
+    /// The lengths of both, s.
+    pub(super) seconds: f64,
+    pub(super) next_seconds: f64,
+}
+
+impl Flow {
+    /// What a rate asks for between two times.
+    pub(super) fn of(rate: &(dyn Fn(f64, f64) -> f64 + Sync), span: &Span) -> Self {
+        let [from, to] = span.times;
+        let (seconds, next_seconds) = (to - from, span.next_seconds);
+        let next = match span.ends_frame {
+            false => volume_between(rate, to, to + next_seconds) / next_seconds,
+            true => {
+                // On the line through the means of both halves of this one.
+                let middle = 0.5 * (from + to);
+                let [first, second] = [[from, middle], [middle, to]].map(|[from, to]| volume_between(rate, from, to));
+                let [first, second] = [first, second].map(|volume| 2.0 * volume / seconds);
+                (second + 1.5 * (second - first)).clamp(0.0, 2.0 * second)
+            }
+        };
+        Self { gave: volume_between(rate, from, to), next, seconds, next_seconds }
+    }
+}
+
 /// What a rate asks for between two times, m³; nothing where it is negative or not a number.
-pub(super) fn volume_between(rate: &(dyn Fn(f64, f64) -> f64 + Sync), from: f64, to: f64) -> f64 {
+fn volume_between(rate: &(dyn Fn(f64, f64) -> f64 + Sync), from: f64, to: f64) -> f64 {
     let volume = rate(from, to);
     if volume.is_finite() { volume.max(0.0) } else { 0.0 }
 }

@@ -2,7 +2,7 @@
 
 use crate::rows::CellRows;
 use crate::step::LiquidReport;
-use crate::step::domain::{Obstacle, share_outside};
+use crate::step::domain::{Obstacle, Wall, share_outside};
 use crate::step::exchange::Imposed;
 use crate::step::force::pressed;
 use crate::step::motion::Guess;
@@ -166,7 +166,7 @@ impl Projection<'_> {
     fn viscous_impulse(&self, equations: &ViscousEquations, u: &FaceFields<f64>, solid: Obstacle<'_>) -> [f64; 3] {
         let domain = &self.settings.domain;
         equations.solver.solid_impulse(u, |axis, cell| {
-            let is_inner = domain.contains(cell) && domain.wall_at(axis, cell).is_none();
+            let is_inner = domain.contains(cell) && matches!(domain.wall_at(axis, cell), None | Some(Wall::Periodic));
             is_inner && share_outside(axis, cell, solid) == 0.0
         })
     }

@@ -10,7 +10,7 @@ use crate::step::flight::flying;
 use crate::step::motion::{Gain, LiquidCells, Motion, largest_of};
 use crate::step::outflow::outflow;
 use crate::step::project::{Materials, Projection};
-use crate::step::sources::{LiquidSink, LiquidSource};
+use crate::step::sources::{LiquidSink, LiquidSource, Span};
 use crate::step::turned;
 use crate::step::{LiquidReport, LiquidSettings, Splitting};
 use crate::velocity::{Advection, Around, FaceFields, MacVelocity, Sampler};
@@ -133,14 +133,15 @@ pub(super) fn most_layers() -> i32 {
     layers(FARTHEST)
 }
 
-/// Moves on between two times since the start of the frame, s. Gravity and viscosity are read in the middle.
+/// Moves on by a substep. Gravity and viscosity are read in the middle.
 pub(super) fn substep(
     settings: &LiquidSettings,
     surface: &mut dyn Surface,
     motion: &mut Motion,
     around: &Surroundings<'_>,
-    times: [f64; 2],
+    span: Span,
 ) -> LiquidReport {
+    let times = span.times;
     let (seconds, middle) = (times[1] - times[0], 0.5 * (times[0] + times[1]));
     // Where it is and how it moves at the middle of the substep is what pushes the liquid.
     let solid = around.solid.map(|solid| solid.at(middle));
@@ -160,7 +161,7 @@ pub(super) fn substep(
     if let Some(solid) = solid {
         surface.meet(&|point| solid.distance(point));
     }
-    let mut exchanged = Exchange { settings, around, solid, times }.apply(surface, motion);
+    let mut exchanged = Exchange { settings, around, solid, span }.apply(surface, motion);
 
     let mut cells = LiquidCells::of(&settings.domain, surface, solid);
     let imposed = exchanged.impose(&mut cells);
@@ -182,6 +183,8 @@ pub(super) fn substep(
 
     let pull = gravity.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
     let speed = motion.largest_speed().max(exchanged.speed(settings.cell));
+    // Of liquid at rest without weight only solids say how fast it will be.
+    let speed = if speed.max(pull) > 0.0 { speed } else { cells.largest_solid_speed() };
     let own = [(around.viscosity)(middle), settings.density];
     let materials = motion.materials_of(&cells, surface.view(), &settings.domain, own.map(|own| own as f32));
     let materials = Materials::new(own, materials, settings, seconds);

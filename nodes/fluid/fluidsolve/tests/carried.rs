@@ -50,6 +50,23 @@ fn tracers_fall_with_the_liquid_and_keep_their_attributes() {
     assert_eq!(from[2], to[2]);
 }
 
+/// The velocity of a tracer is how it moves: that of the liquid next to it, and none out of its reach, as far as the
+/// velocity of the volume goes on there.
+#[test]
+fn a_tracer_that_liquid_has_not_reached_has_no_velocity() {
+    let places = vec![[0.3, 0.5, 0.5], [0.56, 0.5, 0.5], [0.67, 0.5, 0.5], [0.3, 0.5, 0.95]];
+    let bench = solving(ball([0.3, 0.5, 0.5], 0.22))
+        .input(TRACERS, Component::points(places))
+        .set(GRAVITY, [0.0; 3])
+        .set(INITIAL_VELOCITY, [0.5, 0.0, 0.0]);
+    for frame in [1, 2] {
+        let velocity = of_kind(&particles_at(&bench, frame), 3, V);
+        for (v, expected) in velocity.iter().zip([0.5, 0.5, 0.0, 0.0]) {
+            assert!((v[0] - expected).abs() < 1e-3 && v[1].abs() + v[2].abs() < 1e-3, "{frame}: {velocity:?}");
+        }
+    }
+}
+
 /// Attributes of the meshes are on the markers from the start, and stay between the values that came in.
 #[test]
 fn markers_have_the_attributes_of_their_liquid() {

@@ -65,3 +65,28 @@ fn plates_carry_the_thick_liquid_between_them() {
         assert!(x.abs() < 1e-3 * y.abs() && z.abs() < 1e-3 * y.abs(), "{x} {z}");
     }
 }
+
+/// Under a plate that moves at U, at a height of h, thick liquid without end has a shear of U ÷ h: the plate is held back by
+/// viscosity · U ÷ h on all of its area. Once it moves as told, so is what the solves are measured against.
+#[test]
+fn a_plate_over_liquid_without_end_is_held_back_on_all_of_its_area() {
+    for (axis, count) in [(0, 4), (0, 7), (2, 5)] {
+        let (mut walls, mut high) = ([[Wall::Closed; 2], [Wall::Closed; 2], [Wall::Closed; 2]], [3, 12, 3]);
+        walls[2 - axis] = [Wall::FreeSlip; 2];
+        walls[axis] = [Wall::Periodic; 2];
+        high[axis] = count;
+        let domain = Domain { walls, ..Domain::closed([0; 3], high) };
+        let settings = LiquidSettings { tolerance: 1e-6, cfl: 1e9, ..LiquidSettings::new(domain, 0.05) };
+        let mut liquid = Liquid::new(settings, Still::new(domain, |p| p[1] - 8.0));
+        let mut velocity = [0.0; 3];
+        velocity[axis] = 0.5;
+        let (plate, moving) = (|_: f64, p: Vec3| 8.0 - p[1], |_: f64, _: Vec3| velocity);
+        let solid = Some(Solid { distance: &plate, velocity: &moving });
+        let around = Surroundings { viscosity: &|_| 1e4, solid, ..WEIGHTLESS };
+        let reports: Vec<LiquidReport> = (0..4).map(|_| liquid.step_frame(&around, FRAME)).collect();
+        assert!(reports.iter().all(|report| report.solves_cut_short == 0), "{axis} {count}: {reports:?}");
+        let expected = -1e4 * 0.5 / 0.4 * 3.0 * f64::from(count) * 0.05 * 0.05;
+        let force = reports[3].solid_force[axis];
+        assert!((force / expected - 1.0).abs() < 1e-3, "{axis} {count}: {force} {expected}");
+    }
+}
