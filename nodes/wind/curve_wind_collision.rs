@@ -74,7 +74,8 @@ params! { PARAMS:
         "Distance, along the arc of its turn, at which a segment stops before a contact.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     WIDTH: Param<Maskable> = Param::maskable("width", 0.0,
-        "Diameter of the curves in collisions. At 0 they are infinitely thin.")
+        "Diameter of the curves in collisions: their axes keep half of it from colliders, from where they are that far away \
+         on; `offset_root` lifts roots. In corners between two surfaces it may be less. At 0 curves are infinitely thin.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     COHERENCE: Param<Maskable> = Param::maskable("coherence", 0.0,
         "How strongly curves blown into the skin are redirected outward, so that they do not flip from one side to the \
@@ -140,7 +141,7 @@ const MANY: f64 = 20.0;
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Collision",
-    8,
+    9,
     "Keeps curves that are bent by wind out of colliders. Each segment, root to tip, turns from its rest direction \
      towards the direction that the wind gave it, until it touches a collider. Place this node after the wind, and wire \
      the curves from before the wind into `rest`. Attributes of each curve: `unfreed`, the number of segments that still \

@@ -59,7 +59,7 @@ impl Segment<'_> {
         // At all radii alike: written positions differ by an angle. An arc would be a large angle next to the pivot,
         // where a face in a crease comes and goes with rounding.
         let gap = self.gap / self.length;
-        let angle = first_gap(&sector, nearby, sector.angle_of(towards), |radius| 1.001 * (self.half / radius + gap))?;
+        let angle = first_gap(&sector, nearby, sector.angle_of(towards), |_| 1.001 * gap)?;
         Some((angle, sector.direction(angle)))
     }
 }

@@ -224,15 +224,13 @@ impl Above {
     #[inline(always)]
     fn add_block(&self, block: &Block, reaches: &[f32; SHELLS], rises: &mut [F32x16; SHELLS]) {
         let boxes = block.boxes();
-        // Distance of the box, and no less than the largest sum of a corner's coordinates, both from the root.
-        let (mut away, mut size) = (F32x16::splat(f32::NEG_INFINITY), F32x16::splat(0.0));
+        let mut away = F32x16::splat(f32::NEG_INFINITY);
         for axis in 0..3 {
             let root = self.root[axis];
             for lane in 0..LANES {
                 let (before, after) = (boxes.low[axis].0[lane] - root, root - boxes.high[axis].0[lane]);
-                let (most, least) = if before > after { (before, after) } else { (after, before) };
+                let most = if before > after { before } else { after };
                 away.0[lane] = if most > away.0[lane] { most } else { away.0[lane] };
-                size.0[lane] -= least;
             }
         }
         let mut heights = F32x16::splat(f32::NEG_INFINITY);
@@ -241,15 +239,13 @@ impl Above {
                 let x = corner[0].0[lane] - self.root[0];
                 let y = corner[1].0[lane] - self.root[1];
                 let z = corner[2].0[lane] - self.root[2];
-                let height = self.up[0] * x + self.up[1] * y + self.up[2] * z;
+                let size = x.abs() + y.abs() + z.abs();
+                // Five roundings to f32; its intersection with a circle of radius `reach` is computed in f64 to the square
+                // of its size.
+                let doubt = 3e-7 * size + 2e-14 * size * (size / self.reach);
+                let height = self.up[0] * x + self.up[1] * y + self.up[2] * z + doubt;
                 heights.0[lane] = if height > heights.0[lane] { height } else { heights.0[lane] };
             }
-        }
-        for lane in 0..LANES {
-            // Five roundings to f32; its intersection with a circle of radius `reach` is computed in f64 to the square of its
-            // size.
-            let size = size.0[lane];
-            heights.0[lane] += 3e-7 * size + 2e-14 * size * (size / self.reach);
         }
         for shell in 0..SHELLS {
             for lane in 0..LANES {

@@ -2,8 +2,10 @@
 //!
 //! A triangle intersects the sector's plane in a line segment, here called a piece. Along the part of it inside the
 //! circle the angle seen from the pivot is monotonic, so that part blocks one interval of angles, which its ends give
-//! in closed form. A thick segment is a slab: it is blocked by the triangle's part between two planes, whose outline is
-//! up to five such pieces.
+//! in closed form. A thick segment is blocked by the triangle's part between two planes at half its thickness, whose outline
+//! is up to five such pieces, and by what is nearer to it than that in the plane: a point at radius r blocks the angles up to
+//! asin(half/r) around it. Where the pivot itself is nearer to a piece than that, as next to a root on the skin, only the end
+//! of the segment is kept away.
 //!
 //! Computed in f64 relative to the pivot: exact up to f64 rounding. Angles in radians, lengths in metres.
 
@@ -24,9 +26,9 @@ pub(super) struct Sector {
     pub(super) reach: f64,
     /// Obstacles closer to the pivot are ignored.
     pub(super) inner: f64,
-    /// Half the thickness across the plane; 0 tests the plane itself.
+    /// Half the thickness; 0 tests the plane itself.
     pub(super) half: f64,
-    /// Arc length kept from contacts.
+    /// Arc length kept from contacts, beyond the thickness.
     pub(super) back: f64,
 }
 
@@ -125,27 +127,28 @@ impl Sector {
 
     /// As [`Sector::blocked_by`] for a thick segment.
     fn blocked_in_slab(&self, heights: &[f64; 3], flat: [P2; 3], mut found: impl FnMut(Blocked)) {
-        let mut intervals: [Option<Blocked>; 10] = [None; 10];
+        // Each with the angles that it blocks around it.
+        let mut intervals: [Option<[Blocked; 2]>; 10] = [None; 10];
         let mut count = 0;
-        let mut add = |blocked: Blocked| {
-            intervals[count] = Some(blocked);
+        let mut add = |p: P2, q: P2| {
+            intervals[count] = Some([Blocked::between(p, q), self.around(p, q)]);
             count += 1;
         };
         for level in [-self.half, self.half] {
             if let Some(piece) = slice(heights, level, |k| flat[k]) {
-                self.within_reach(piece, |p, q| add(Blocked::between(p, q)));
+                self.within_reach(piece, &mut add);
             }
         }
         for k in 0..3 {
             let (a, b) = (k, (k + 1) % 3);
             if let Some(piece) = between_levels([flat[a], flat[b]], [heights[a], heights[b]], self.half) {
-                self.within_reach(piece, |p, q| add(Blocked::between(p, q)));
+                self.within_reach(piece, &mut add);
             }
         }
         // The outline is one closed curve: seen from a pivot outside it, its pieces form one interval.
         let pieces = || intervals.iter().flatten();
-        let Some(first) = pieces().next() else { return };
-        let all = pieces().fold(*first, |all, piece| {
+        let Some([first, around]) = pieces().next() else { return };
+        let (all, around) = pieces().fold((*first, *around), |(all, wide), [piece, around]| {
             let turns = if piece.lo - all.lo > std::f64::consts::PI {
                 -std::f64::consts::TAU
             } else if all.lo - piece.lo > std::f64::consts::PI {
@@ -153,22 +156,28 @@ impl Sector {
             } else {
                 0.0
             };
-            let piece = Blocked { lo: piece.lo + turns, hi: piece.hi + turns, ..*piece };
-            let (lo, lo_radius) = if piece.lo < all.lo { (piece.lo, piece.lo_radius) } else { (all.lo, all.lo_radius) };
-            let (hi, hi_radius) = if piece.hi > all.hi { (piece.hi, piece.hi_radius) } else { (all.hi, all.hi_radius) };
-            Blocked { lo, hi, lo_radius, hi_radius }
+            (all.with(&piece.turned(turns)), wide.with(&around.turned(turns)))
         });
         if all.hi - all.lo > std::f64::consts::PI {
-            pieces().copied().for_each(found);
+            pieces().for_each(|[_, around]| found(around.from_start()));
         } else if all.lo < 0.0 && all.hi >= 0.0 {
             // It touches the thick segment at the start: its intersection with the middle plane decides which side it
             // is on.
             if let Some(piece) = slice(heights, 0.0, |k| flat[k]) {
-                self.within_reach(piece, |p, q| found(Blocked::between(p, q)));
+                self.within_reach(piece, |p, q| found(self.around(p, q).from_start()));
             }
         } else {
-            found(all);
+            found(around.from_start());
         }
+    }
+
+    /// The angles at which a thick segment is too near to a straight piece between two points.
+    fn around(&self, p: P2, q: P2) -> Blocked {
+        let piece = Blocked::between(p, q);
+        let is_clear = nearest(p, q) >= self.half;
+        let by =
+            |radius: f64| libm::asin((self.half / if is_clear { radius } else { self.reach - self.half }).min(1.0));
+        Blocked { lo: piece.lo - by(piece.lo_radius), hi: piece.hi + by(piece.hi_radius), ..piece }
     }
 
     /// Calls `found` with the ends of each part of a straight piece inside the circle of `reach` and outside that of
@@ -205,6 +214,27 @@ impl Blocked {
         // An interval across the opposite direction continues past π.
         let hi = if hi < lo { hi + std::f64::consts::TAU } else { hi };
         Self { lo, hi, lo_radius: radius(first), hi_radius: radius(last) }
+    }
+
+    fn turned(&self, by: f64) -> Self {
+        Self { lo: self.lo + by, hi: self.hi + by, ..*self }
+    }
+
+    /// The same interval with `lo` in −π…π.
+    fn from_start(&self) -> Self {
+        let turns = match self.lo {
+            lo if lo < -std::f64::consts::PI => std::f64::consts::TAU,
+            lo if lo > std::f64::consts::PI => -std::f64::consts::TAU,
+            _ => 0.0,
+        };
+        self.turned(turns)
+    }
+
+    /// The interval from the lesser start to the greater end of both.
+    fn with(&self, other: &Self) -> Self {
+        let (lo, lo_radius) = if other.lo < self.lo { (other.lo, other.lo_radius) } else { (self.lo, self.lo_radius) };
+        let (hi, hi_radius) = if other.hi > self.hi { (other.hi, other.hi_radius) } else { (self.hi, self.hi_radius) };
+        Self { lo, hi, lo_radius, hi_radius }
     }
 }
 
@@ -261,6 +291,14 @@ fn angle(p: P2) -> f64 {
 #[inline(always)]
 fn radius(p: P2) -> f64 {
     (p[0] * p[0] + p[1] * p[1]).sqrt()
+}
+
+/// Distance of a straight piece from the pivot.
+fn nearest(p: P2, q: P2) -> f64 {
+    let side = [q[0] - p[0], q[1] - p[1]];
+    let square = side[0] * side[0] + side[1] * side[1];
+    let along = if square > 0.0 { (-(p[0] * side[0] + p[1] * side[1]) / square).clamp(0.0, 1.0) } else { 0.0 };
+    radius([p[0] + along * side[0], p[1] + along * side[1]])
 }
 
 /// Where the plane at height `level` cuts a triangle with corners at these heights. A corner at the level counts as

@@ -6,6 +6,7 @@ use super::sector::Sector;
 use super::triangle_filter::Wedge;
 use super::turn_axes::TurnAxes;
 use super::{ContactMethod, perpendicular};
+use numerics::lanes::LANES;
 use numerics::tree::{Block, Cuboid, TriangleTree};
 use numerics::vector::{DVec3, Vec3, to_f32};
 use std::f64::consts::PI;
@@ -89,7 +90,7 @@ impl Segment<'_> {
             reach: self.length + self.half + self.rounding,
             inner: self.inner,
             half: self.half,
-            back: self.gap + self.half,
+            back: self.gap,
         }
     }
 
@@ -132,16 +133,42 @@ impl Segment<'_> {
     fn last_free_step(&self, sector: &Sector, steps: u32, nearby: &Nearby<'_>) -> Stop {
         let angle = sector.angle_of(&self.to);
         let at = |step: u32| angle * f64::from(step) / f64::from(steps);
-        if self.crosses(&sector.u, nearby).is_some() {
+        let near = self.near(sector, nearby, angle);
+        if self.crosses(&sector.u, nearby).is_some() || near.contain(0.0) {
             return Stop::Stuck;
         }
         for step in 1..=steps {
             let direction = if step == steps { self.to } else { sector.direction(at(step)) };
-            if self.crosses(&direction, nearby).is_some() {
+            if near.contain(at(step)) || self.crosses(&direction, nearby).is_some() {
                 return Stop::At(sector.direction(at(step - 1)));
             }
         }
         Stop::None
+    }
+
+    /// The angles up to `most` at which a thick segment is too near to something; none of a thin one.
+    fn near(&self, sector: &Sector, nearby: &Nearby<'_>, most: f64) -> Taken {
+        if self.half > 0.0 { Taken::of(sector, nearby, most, |_| 0.0) } else { Taken::default() }
+    }
+
+    /// The normal, on the pivot's side, of the triangle that a thick segment is too near to at its start, and that it must turn
+    /// farthest away from.
+    fn too_near(&self, sector: &Sector, nearby: &Nearby<'_>) -> Option<DVec3> {
+        let mut farthest: Option<(f64, DVec3)> = None;
+        for (block, lanes) in nearby {
+            for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
+                let corners = corners(block, lane);
+                sector.blocked_by(&corners, |blocked| {
+                    let angle = blocked.hi.min(-blocked.lo);
+                    if angle >= 0.0 && farthest.is_none_or(|(known, _)| angle > known) {
+                        let normal = (corners[1] - corners[0]).cross(&(corners[2] - corners[0]));
+                        let side = normal.dot(&(self.pivot - corners[0]));
+                        farthest = Some((angle, normal * (side.signum() / normal.norm())));
+                    }
+                });
+            }
+        }
+        farthest.map(|(_, normal)| normal).filter(|normal| normal.x.is_finite())
     }
 
     /// The nearest free direction on the great circle away from what the segment crosses; `None` if there is none
@@ -153,11 +180,13 @@ impl Segment<'_> {
         obstacles: &[&'t TriangleTree],
         nearby: &mut Nearby<'t>,
     ) -> Option<DVec3> {
-        let crossed = self.crosses(&self.from, nearby);
+        let crossed = self.crosses(&self.from, nearby).map(|crossed| crossed.normal);
+        let too_near = || self.too_near(&self.sector(self.from, self.to), nearby);
+        let crossed = crossed.or_else(|| if self.half > 0.0 { too_near() } else { None });
         // Perpendicular to the surface, all directions out are equally near: the one that bends the curve least is
         // chosen.
         let outwards = match crossed {
-            Some(crossed) => crossed.normal + self.before * STRAIGHT_IN,
+            Some(normal) => normal + self.before * STRAIGHT_IN,
             None => self.axes.last(),
         };
         let sector = self.sector(self.from, outwards);
@@ -167,7 +196,10 @@ impl Segment<'_> {
             ContactMethod::Exact => first_gap(&sector, nearby, PI, |radius| 1.001 * sector.back / radius),
             ContactMethod::Steps(steps) => {
                 let at = |step: u32| PI * f64::from(step) / f64::from(steps);
-                (1..=steps).map(at).find(|angle| self.crosses(&sector.direction(*angle), nearby).is_none())
+                let near = self.near(&sector, nearby, PI);
+                let is_free =
+                    |angle: &f64| !near.contain(*angle) && self.crosses(&sector.direction(*angle), nearby).is_none();
+                (1..=steps).map(at).find(is_free)
             }
         };
         angle.map(|angle| sector.direction(angle))
@@ -247,24 +279,8 @@ fn first_stop(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop {
 /// The first angle up to `most` at which nothing is within the angle `kept` from a contact at a radius.
 #[inline(always)]
 pub(super) fn first_gap(sector: &Sector, nearby: &Nearby<'_>, most: f64, kept: impl Fn(f64) -> f64) -> Option<f64> {
-    let (sine, cosine) = if most < PI { libm::sincos(most) } else { (0.0, -1.0) };
-    let wedge = Wedge::new(sector, [cosine, sine]);
-    let mut taken: Vec<[f64; 2]> = Vec::new();
-    for (block, lanes) in nearby {
-        let mut lanes = lanes & wedge.may_meet(block);
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
-            sector.blocked_by(&corners(block, lane), |blocked| {
-                let [lo, hi] = [blocked.lo - kept(blocked.lo_radius), blocked.hi + kept(blocked.hi_radius)];
-                taken.push([lo, hi]);
-                taken.push([lo - std::f64::consts::TAU, hi - std::f64::consts::TAU]);
-            });
-        }
-    }
-    taken.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let mut angle = 0.0;
-    for [lo, hi] in taken {
+    for [lo, hi] in Taken::of(sector, nearby, most, kept).0 {
         if lo > angle {
             break;
         }
@@ -273,6 +289,38 @@ pub(super) fn first_gap(sector: &Sector, nearby: &Nearby<'_>, most: f64, kept: i
         }
     }
     (angle <= most).then_some(angle)
+}
+
+/// Intervals of angles at which a sector is blocked, by their starts.
+#[derive(Default)]
+struct Taken(Vec<[f64; 2]>);
+
+impl Taken {
+    /// Those up to `most`, each widened by the angle `kept` from a contact at a radius.
+    #[inline(always)]
+    fn of(sector: &Sector, nearby: &Nearby<'_>, most: f64, kept: impl Fn(f64) -> f64) -> Self {
+        let (sine, cosine) = if most < PI { libm::sincos(most) } else { (0.0, -1.0) };
+        let wedge = Wedge::new(sector, [cosine, sine]);
+        let mut taken: Vec<[f64; 2]> = Vec::new();
+        for (block, lanes) in nearby {
+            let mut lanes = lanes & wedge.may_meet(block);
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize;
+                lanes &= lanes - 1;
+                sector.blocked_by(&corners(block, lane), |blocked| {
+                    let [lo, hi] = [blocked.lo - kept(blocked.lo_radius), blocked.hi + kept(blocked.hi_radius)];
+                    taken.push([lo, hi]);
+                    taken.push([lo - std::f64::consts::TAU, hi - std::f64::consts::TAU]);
+                });
+            }
+        }
+        taken.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        Self(taken)
+    }
+
+    fn contain(&self, angle: f64) -> bool {
+        self.0.iter().any(|[lo, hi]| (*lo..=*hi).contains(&angle))
+    }
 }
 
 impl Sector {
@@ -297,7 +345,7 @@ impl Sector {
             if v <= 0.0 && past <= 0.0 {
                 least = -(u * u + v * v).sqrt();
             }
-            let slack = self.half + self.back + 1e-6 * (self.reach + self.pivot[axis].abs());
+            let slack = self.half + (self.back + self.half) + 1e-6 * (self.reach + self.pivot[axis].abs());
             low[axis] = (self.pivot[axis] + least * self.reach - slack) as f32;
             high[axis] = (self.pivot[axis] + most * self.reach + slack) as f32;
         }

@@ -11,6 +11,7 @@ mod hairs;
 pub(super) mod kept;
 mod raised;
 mod sectors;
+mod thick;
 
 /// Whether the segment crosses the triangle, by solving for its point in the plane. Touching does not count.
 fn crosses(a: &DVec3, b: &DVec3, [p, q, r]: &[DVec3; 3]) -> bool {

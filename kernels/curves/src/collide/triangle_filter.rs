@@ -27,7 +27,7 @@ impl Wedge {
             axes: [to_f32(sector.u), to_f32(sector.v), to_f32(sector.n)],
             until: [cosine as f32, sine as f32],
             half: sector.half as f32,
-            back: sector.back as f32,
+            back: (sector.back + sector.half) as f32,
             slack: ROUNDING * (sector.reach as f32 + 0.1 * vector::largest(pivot)),
             pivot,
         }
