@@ -77,3 +77,14 @@ fn each_of_two_liquids_keeps_its_volume() {
     let drift: Vec<f64> = out.iter().map(|frame| metric(frame, MATERIAL_DRIFT)).collect();
     assert!(drift.iter().all(|drift| *drift < 0.05), "{drift:?}");
 }
+
+/// A slab under an open ceiling falls: air follows it.
+#[test]
+fn no_liquid_comes_in_through_an_open_ceiling() {
+    let slab = solving(cuboid([-1.0, 0.7, -1.0], [2.0, 2.0, 2.0])).set(WALL_Y_MAX, Walls::Open).set(VISCOSITY, 0.0);
+    let out = slab.frames(1..=6);
+    for frame in &out[1..] {
+        let share = metric(frame, VOLUME_NOW) / metric(&out[0], VOLUME_NOW);
+        assert!((share - 1.0).abs() < 0.05 && metric(frame, LEFT_DOMAIN).abs() < 1e-9, "{:?}", frame.metrics);
+    }
+}
