@@ -88,3 +88,15 @@ fn no_liquid_comes_in_through_an_open_ceiling() {
         assert!((share - 1.0).abs() < 0.05 && metric(frame, LEFT_DOMAIN).abs() < 1e-9, "{:?}", frame.metrics);
     }
 }
+
+/// A ball that a source makes where nothing moves grows by all that the source gives, from when cells can show it.
+#[test]
+fn a_source_without_gravity_makes_a_ball_of_its_volume() {
+    let body = with(ball([0.5; 3], 0.25), &[(SOURCE_RATE, 0.02)]);
+    let bench = bench(&NODE).input(SOURCES, body).set(CELL, 1.0 / 16.0).set(DOMAIN_FROM, [0.0; 3]);
+    let out = bench.set(DOMAIN_TO, [1.0; 3]).set(GRAVITY, [0.0; 3]).set(VISCOSITY, 1000.0).frames(1..=13);
+    let shares: Vec<f64> = out[5..].iter().map(|frame| metric(frame, VOLUME_NOW) / metric(frame, SOURCED)).collect();
+    assert!(shares.iter().all(|share| (share - 1.0).abs() < 0.05), "{shares:?}");
+    assert!(out[1..].iter().all(|frame| metric(frame, SPRAY) == 0.0));
+    assert!((metric(&out[12], SOURCED) / (0.02 * 12.0 * H) - 1.0).abs() < 0.05, "{:?}", out[12].metrics);
+}
