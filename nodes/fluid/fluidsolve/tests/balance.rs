@@ -100,3 +100,34 @@ fn a_source_without_gravity_makes_a_ball_of_its_volume() {
     assert!(out[1..].iter().all(|frame| metric(frame, SPRAY) == 0.0));
     assert!((metric(&out[12], SOURCED) / (0.02 * 12.0 * H) - 1.0).abs() < 0.05, "{:?}", out[12].metrics);
 }
+
+/// A drop of spray keeps its id while it flies: nobody else gets it.
+#[test]
+fn drops_keep_their_ids() {
+    let block = solving(cuboid([0.25, 0.3, 0.25], [0.75, 0.7, 0.75]))
+        .set(INITIAL_VELOCITY, [0.0, -8.0, 0.0])
+        .set(VISCOSITY, 0.001)
+        .set(MAX_SUBSTEPS, 1);
+    let drops = |frame: i64| -> Vec<(i32, f32)> {
+        let particles = particles_at(&block, frame);
+        let ids = particles.get(ID).unwrap();
+        let mut unique = ids.to_vec();
+        unique.sort_unstable();
+        unique.dedup();
+        assert_eq!(unique.len(), ids.len());
+        let rows = particles.get(PARTICLE_KIND).unwrap().iter().zip(ids).zip(particles.get(PARTICLE_VOLUME).unwrap());
+        rows.filter(|((kind, _), _)| **kind == PARTICLE_SPRAY).map(|((_, id), volume)| (*id, *volume)).collect()
+    };
+    let (mut stayed, mut last) = (0, Vec::new());
+    for frame in 2..=12 {
+        let now = drops(frame);
+        for (id, volume) in &now {
+            if let Some((_, before)) = last.iter().find(|(before, _)| before == id) {
+                assert_eq!(volume, before, "frame {frame}, {id}");
+                stayed += 1;
+            }
+        }
+        last = now;
+    }
+    assert!(stayed > 5, "{stayed}");
+}
