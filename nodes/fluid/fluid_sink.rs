@@ -10,7 +10,8 @@ inputs! { INPUTS:
 
 params! { PARAMS:
     RATE: Param<f32> = Param::float("rate", 0.0,
-        "Volume of liquid removed per second, while there is liquid in the shape. 0 removes all that enters.")
+        "Volume of liquid removed per second, while there is liquid in the shape. 0 removes all that enters, also \
+         where an animated rate falls to 0; to stop a sink, animate `active`.")
         .unit(Unit::CubicMetresPerSecond).at_least(0.0).soft(0.0, 0.01);
     ACTIVE: Param<bool> = Param::bool("active", true, "Whether the sink removes liquid.");
 }

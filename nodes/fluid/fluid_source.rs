@@ -15,8 +15,8 @@ inputs! { INPUTS:
 
 params! { PARAMS:
     RATE: Param<f32> = Param::float("rate", 0.0,
-        "Volume of liquid added per second, from the first frame on. 0 keeps the shape full, and `sourced` counts what that adds; to \
-         stop a source, animate `active`. A rate below cross-section · `velocity` leaves the middle of the shape as a thinner \
+        "Volume of liquid added per second, from the first frame on. 0 keeps the shape full, and `sourced` counts what that adds, also where \
+         an animated rate falls to 0; to stop a source, animate `active`. A rate below cross-section · `velocity` leaves the middle of the shape as a thinner \
          stream of that velocity; a higher rate also pushes liquid out around the shape. Where liquid has nowhere to go, as in a sealed \
          box, the source gives less, and a note says so.")
         .unit(Unit::CubicMetresPerSecond).at_least(0.0).soft(0.0, 0.01);

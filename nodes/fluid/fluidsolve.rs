@@ -139,7 +139,7 @@ const SURFACE: Output = Output::new(
     "surface",
     &[Kind::Mesh],
     "The surface of the liquid: closed, with `N`, `v` and `thickness`; the same mesh that Fluid_Surface makes from \
-        `volume`.",
+        `volume`. `v` is how the liquid moves: what a node after it, such as an animated Transform, adds from frame to frame is not in it.",
 );
 const PARTICLES: Output = Output::new(
     "particles",
@@ -240,6 +240,23 @@ metrics! { METRICS:
         `sinks`.")
         .warn_above(0.0, "A Fluid_Sink at `sources` gives liquid, and a Fluid_Source at `sinks` takes all that enters it. Wire each to \
             the input that it is made for.");
+    RATE_ENDED = Metric::new("rate_ended", Unit::None,
+        "Sources and sinks whose `rate` was above 0 in an earlier frame and is 0 in this one.")
+        .warn_above(0.0, "The `rate` of these sources and sinks has fallen to 0, which does not stop them: a source then keeps its shape \
+            full, and a sink removes all that enters it. To stop one, animate `active`.");
+    IN_VAIN = Metric::new("liquid_settings_unused", Unit::None,
+        "Wires from a Fluid_Source to `liquid`, and not to `sources`, whose `velocity`, `rate` or `active` has no effect.")
+        .warn_last_above(0.0, "A Fluid_Source at `liquid` only says where liquid is at the start, and its viscosity and density; its \
+            `velocity`, `rate` and `active` have no effect. Use `initial_velocity`, or wire it to `sources`.");
+    CLASHES = Metric::new("attribute_clashes", Unit::None,
+        "Names of float attributes on `liquid`, `sources` and `tracers` that have another number of floats on some than on the first.")
+        .warn_above(0.0, "Of these attributes' names, the first mesh or points to have one says how many floats it has, first of `liquid`, then of \
+            `tracers` and of `sources`; what came by the same name with another number of floats was left out. Rename it there.");
+    POSITION_STEP = Metric::new("position_step", Unit::None,
+        "Distance, in cells, between neighbouring positions in single precision where the surface is farthest from the origin.")
+        .warn_above(0.03125, "The liquid is so far from the origin that positions, which have single precision, step by {position_step} \
+            of a cell: the shapes that come in and the surface are rounded to that. Move the scene near the origin, and set the scene's \
+            `origin` to where it was.");
     OUTSIDE = Metric::new("liquid_outside", Unit::None,
         "Largest share of any mesh wired to `liquid` that lay outside the box at the start, and was left out.")
         .warn_last_above(0.01, "A mesh at `liquid` lies outside the box, wholly or in part; what is outside was left out. If that is not meant, move it, \

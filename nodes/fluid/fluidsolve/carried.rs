@@ -28,7 +28,11 @@ const OWN: [&str; 9] = [
 
 /// The attributes of points, of 1, 3 or 4 floats, that came in.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(super) struct CarriedColumns(Vec<CarriedColumn>);
+pub(super) struct CarriedColumns {
+    all: Vec<CarriedColumn>,
+    /// The names that some came with another number of floats by: what they are there is left out.
+    clashes: Vec<String>,
+}
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct CarriedColumn {
@@ -58,18 +62,29 @@ fn brought(part: &Component) -> impl Iterator<Item = (&str, &Column)> {
 }
 
 impl CarriedColumns {
+    /// Number of names that came with several numbers of floats.
+    pub(super) fn clashes(&self) -> usize {
+        self.clashes.len()
+    }
+
     /// The number of lists that markers have.
     fn lists(&self) -> usize {
-        self.0.iter().filter_map(|column| Some(column.first? + column.width)).max().unwrap_or(0)
+        self.all.iter().filter_map(|column| Some(column.first? + column.width)).max().unwrap_or(0)
     }
 
     /// The place of a column, and whether it has that many floats: the first that came with a name says how many it has.
     fn column(&mut self, name: &str, width: usize) -> Option<&mut CarriedColumn> {
-        let place = self.0.iter().position(|column| column.name == name).unwrap_or_else(|| {
-            self.0.push(CarriedColumn { name: name.to_owned(), width, first: None, tracers: Vec::new() });
-            self.0.len() - 1
+        let place = self.all.iter().position(|column| column.name == name).unwrap_or_else(|| {
+            self.all.push(CarriedColumn { name: name.to_owned(), width, first: None, tracers: Vec::new() });
+            self.all.len() - 1
         });
-        Some(&mut self.0[place]).filter(|column| column.width == width)
+        if self.all[place].width != width {
+            if !self.clashes.iter().any(|clash| clash == name) {
+                self.clashes.push(name.to_owned());
+            }
+            return None;
+        }
+        Some(&mut self.all[place])
     }
 
     /// Makes place on the markers for the attributes of a mesh; says what it has.
@@ -132,7 +147,7 @@ impl CarriedColumns {
         tracers: &[u32],
     ) -> Result<()> {
         let markers = surface.markers();
-        for column in self.0.iter().filter(|column| cx.wants_named(&column.name)) {
+        for column in self.all.iter().filter(|column| cx.wants_named(&column.name)) {
             let (width, absent) = (column.width, column.absent());
             let mut rows = Vec::with_capacity(width * particles.point_count());
             match column.first {

@@ -14,7 +14,7 @@ use crate::shared::volume::Lattice;
 choice! {
     /// A side of the box.
     pub(super) enum Walls {
-        Open = "open": "liquid leaves, and is gone",
+        Open = "open": "liquid leaves, and is gone; beyond it is air, which comes in where liquid moves away",
         Closed = "closed": "liquid stays in; `slip` says how freely it slides along",
         FreeSlip = "free_slip": "liquid stays in and slides along without friction",
         Periodic = "periodic": "liquid that leaves comes in on the other side, which must be periodic too; shapes and colliders do not repeat",

@@ -124,7 +124,7 @@ impl Opening {
     }
 
     /// Whether it gives or takes at a rate, rather than keeping its shape full or empty.
-    fn has_rate(&self) -> bool {
+    pub(super) fn has_rate(&self) -> bool {
         self.rates.iter().any(|rate| *rate > 0.0)
     }
 
@@ -136,7 +136,7 @@ impl Opening {
         (sample, at - sample as f64)
     }
 
-    fn is_active(&self, share: f64) -> bool {
+    pub(super) fn is_active(&self, share: f64) -> bool {
         self.active[self.sample(share).0]
     }
 

@@ -51,9 +51,8 @@ pub(super) fn particles(cx: &Cx, run: &Run, lattice: Lattice, volume: &Volume) -
         particles.set(N, normals)?;
     }
     if cx.wants(ID) {
-        // Spray counts down from -1.
         let mut ids: Vec<i32> = markers.ids.iter().map(|id| *id as i32).collect();
-        ids.extend((1..).take(run.spray.len()).map(|n: i32| -n));
+        ids.extend(run.spray.iter().map(|drop| drop.id));
         ids.extend(tracers.numbers().iter().map(|number| run.tracer_ids[*number as usize]));
         particles.set(ID, ids)?;
     }

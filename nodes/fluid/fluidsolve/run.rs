@@ -23,12 +23,13 @@ use super::shapes::{Colliders, in_cells};
 use super::spray::{Air, SprayDrop, gathered, rejoining};
 use super::start::liquid_at_start;
 use super::{
-    CFL_REACHED, COLLECTING, DENSITY, EULER_CHARACTERISTIC, FAST_SHAPES, IN_COLLIDERS, INITIAL_SPIN, INITIAL_VELOCITY,
-    LEFT_DOMAIN, LIQUID_CELLS, MADE_GOOD, MADE_GOOD_NOW, MATERIAL_DRIFT, MISWIRED, OUTSIDE, PARTICLES, PARTICLES_NOW,
-    SINKS, SOURCED, SOURCES, SPRAY, SUNK, SURFACE, TIME_SCALE, TRACERS, TRACERS_OUTSIDE, UNSEEN, VOLUME,
-    VOLUME_BALANCE, VOLUME_CORRECTION, VOLUME_DRIFT, VOLUME_DRIFT_RAW, VOLUME_NOW, WITHHELD, WITHHELD_WIRE,
+    CELL, CFL_REACHED, CLASHES, COLLECTING, DENSITY, EULER_CHARACTERISTIC, FAST_SHAPES, IN_COLLIDERS, IN_VAIN,
+    INITIAL_SPIN, INITIAL_VELOCITY, LEFT_DOMAIN, LIQUID, LIQUID_CELLS, MADE_GOOD, MADE_GOOD_NOW, MATERIAL_DRIFT,
+    MISWIRED, OUTSIDE, PARTICLES, PARTICLES_NOW, POSITION_STEP, RATE_ENDED, SINKS, SOURCED, SOURCES, SPRAY, SUNK,
+    SURFACE, TIME_SCALE, TRACERS, TRACERS_OUTSIDE, UNSEEN, VOLUME, VOLUME_BALANCE, VOLUME_CORRECTION, VOLUME_DRIFT,
+    VOLUME_DRIFT_RAW, VOLUME_NOW, WITHHELD, WITHHELD_WIRE,
 };
-use crate::shared::attributes::{SINK_RATE, SOURCE_RATE};
+use crate::shared::attributes::{SINK_RATE, SOURCE_ACTIVE, SOURCE_RATE, SOURCE_VELOCITY};
 use crate::shared::surface::{SurfaceDetail, surface};
 use crate::shared::volume::volume;
 
@@ -55,10 +56,16 @@ pub(super) struct Run {
     withheld_wire: usize,
     /// Sources that gave nothing in the last frame, since it is too little.
     collecting: usize,
+    /// For each wire of `sources`, then `sinks`: whether it had a rate in a frame before.
+    had_rate: Vec<bool>,
+    /// Those of them that had one, and keep full or empty in the last frame.
+    rate_ended: usize,
     targets: VolumeTargets,
     /// The liquids at the start; those of sources are numbered on from there.
     start_phases: u32,
     pub(super) spray: Vec<SprayDrop>,
+    /// The id of the next drop; they count down from −1.
+    next_drop: i32,
     /// The attributes that came with liquid, sources and tracers.
     pub(super) columns: CarriedColumns,
     /// The ids of the tracers at the start.
@@ -106,6 +113,7 @@ impl Chain for Run {
         let mut start_metrics = MetricValues::default();
         start_metrics.set(OUTSIDE, known.outside);
         start_metrics.set(IN_COLLIDERS, known.in_colliders);
+        start_metrics.set(IN_VAIN, said_in_vain(cx) as f64);
         let (mut columns, tracers) = (start.columns, cx.part_at_start(TRACERS));
         columns.add_tracers(&tracers);
         for mesh in cx.part_at_start(SOURCES) {
@@ -132,9 +140,12 @@ impl Chain for Run {
             withheld: 0.0,
             withheld_wire: 0,
             collecting: 0,
+            had_rate: Vec::new(),
+            rate_ended: 0,
             targets,
             start_phases,
             spray: Vec::new(),
+            next_drop: -1,
             columns,
             tracer_ids: tracer_ids(&tracers),
             metrics: MetricValues::default(),
@@ -161,6 +172,7 @@ impl Chain for Run {
         self.metrics.set(WITHHELD, if has_moved { self.withheld } else { 0.0 });
         self.metrics.set(WITHHELD_WIRE, self.withheld_wire as f64);
         self.metrics.set(COLLECTING, if has_moved { self.collecting as f64 } else { 0.0 });
+        self.metrics.set(RATE_ENDED, if has_moved { self.rate_ended as f64 } else { 0.0 });
         self.metrics.set(MISWIRED, miswired(cx) as f64);
         self.metrics.set(FAST_SHAPES, (colliders.fast() + fast_openings) as f64);
         self.colliders = Some(colliders);
@@ -175,6 +187,8 @@ impl Chain for Run {
         cx.publish(VOLUME_NOW, self.targets.volume());
         cx.publish(EULER_CHARACTERISTIC, euler_characteristic(&surface));
         cx.publish(PARTICLES_NOW, particle_count(self) as f64);
+        cx.publish(POSITION_STEP, position_step(&surface) / cx.get(CELL));
+        cx.publish(CLASHES, self.columns.clashes() as f64);
         let mut outputs = SURFACE.with(Geometry::from(surface));
         if cx.wants_output(PARTICLES) {
             outputs = outputs.and(PARTICLES, Geometry::from(particles(cx, self, lattice(cx), &volume)?));
@@ -206,6 +220,7 @@ impl Run {
             *attributes = self.columns.add_mesh(mesh, lattice, &mut self.surface);
         }
         let fast = sources.iter().chain(&sinks).filter(|opening| opening.is_fast()).count();
+        self.note_rates(sources.iter().chain(&sinks));
         let has_material = sources.iter().any(Opening::has_material);
         let share = |time: f64| (time / seconds).clamp(0.0, 1.0);
         let (first, frames) = (cx.previous().number(), cx.frame().number() - cx.previous().number());
@@ -262,6 +277,17 @@ impl Run {
         Ok((report, fast))
     }
 
+    /// Counts the openings whose rate fell to 0, where that no longer limits what they give or take.
+    fn note_rates<'a>(&mut self, openings: impl Iterator<Item = &'a Opening>) {
+        self.rate_ended = 0;
+        for (n, opening) in openings.enumerate() {
+            self.had_rate.resize(self.had_rate.len().max(n + 1), false);
+            let had = self.had_rate[n];
+            self.had_rate[n] = had || opening.has_rate();
+            self.rate_ended += usize::from(had && !opening.has_rate() && opening.is_active(1.0));
+        }
+    }
+
     /// Brings each piece of liquid to the volume that it should have, and makes spray of those that the grid lost, and liquid
     /// of spray that it can show.
     fn correct(&mut self, cx: &StepCx, settings: LiquidSettings, report: &LiquidReport, air: &Air<'_>) {
@@ -297,8 +323,9 @@ impl Run {
             let velocity = self.motion.velocity().at(&mut sampler, piece.place);
             let material = materials.as_ref().map_or([None; 2], |own| [own[n].viscosity, own[n].density]);
             let LostPiece { place, volume, phase } = *piece;
-            let mut drop = SprayDrop { place, velocity, volume, material, phase };
+            let mut drop = SprayDrop { place, velocity, volume, material, phase, id: self.next_drop };
             drop.put_outside(air);
+            self.next_drop = self.next_drop.checked_sub(1).unwrap_or(-1);
             self.spray.push(drop);
         }
     }
@@ -367,6 +394,24 @@ impl Run {
 /// Simulated seconds per second of the scene: what makes velocities of the scene of those of the simulation.
 pub(super) fn pace(cx: &Cx) -> f32 {
     cx.get(TIME_SCALE) as f32
+}
+
+/// The distance between neighbouring coordinates that single precision has, m, at the largest of a part.
+fn position_step(part: &Component) -> f64 {
+    let largest = part.positions().iter().flatten().fold(0.0_f32, |most, x| most.max(x.abs()));
+    f64::from(largest.next_up()) - f64::from(largest)
+}
+
+/// Wires of `liquid` that say what only a source does, and are none.
+fn said_in_vain(cx: &FrameCx) -> usize {
+    let sources = cx.part_at_start(SOURCES);
+    let is_source = |mesh: &Component| sources.iter().any(|source| source.positions() == mesh.positions());
+    let says = |mesh: &Component| {
+        let has_rate = mesh.get(SOURCE_RATE).and_then(|rows| rows.first()).is_some_and(|rate| *rate > 0.0);
+        let is_off = mesh.get(SOURCE_ACTIVE).and_then(|rows| rows.first()) == Some(&0);
+        has_rate || is_off || mesh.get(SOURCE_VELOCITY).is_some()
+    };
+    cx.part_at_start(LIQUID).into_iter().filter(|mesh| says(mesh) && !is_source(mesh)).count()
 }
 
 /// A share of a volume in per cent, without its sign; 0 of none.

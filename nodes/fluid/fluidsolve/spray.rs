@@ -37,6 +37,8 @@ pub(super) struct SprayDrop {
     pub(super) material: [Option<f32>; 2],
     /// Which of the liquids that do not mix it is.
     pub(super) phase: u32,
+    /// Who it is, for its life: below 0, where no marker is.
+    pub(super) id: i32,
 }
 
 /// What drops fly in during a step.
@@ -207,7 +209,7 @@ mod tests {
     use crate::shared::volume::Lattice;
 
     fn drop(place: [f32; 3], velocity: [f32; 3]) -> SprayDrop {
-        SprayDrop { place, velocity, volume: 1e-9, material: [None; 2], phase: 0 }
+        SprayDrop { place, velocity, volume: 1e-9, material: [None; 2], phase: 0, id: -1 }
     }
 
     fn flown(drop: SprayDrop, domain: &Domain, steps: u32) -> Option<SprayDrop> {

@@ -5,7 +5,7 @@
 //!
 //! Promise: memory and time follow the liquid and its surface; the bits are the same on any number of threads. The unit of
 //! length is the cell: cell [x, y, z] reaches from there to [x + 1, y + 1, z + 1] and φ is that of its middle. At the ends
-//! of the domain φ goes on as it is there, so a surface meets a wall at a right angle. Limit: coordinates beyond 2²⁰
+//! of the domain φ goes on as it is there, so a surface meets a wall at a right angle; beyond open sides is air. Limit: coordinates beyond 2²⁰
 //! cells lose the digits that place a surface within a cell.
 
 pub(crate) mod cubic;
@@ -89,7 +89,12 @@ pub struct LevelSet {
     phi: Vec<f32>,
     low: Cell,
     high: Cell,
+    /// For x, y and z whether air comes in at the low side and at the high side.
+    open: OpenSides,
 }
+
+/// For x, y and z whether the low side and the high side of a domain let air in.
+pub type OpenSides = [[bool; 2]; 3];
 
 impl LevelSet {
     /// The level set of a domain `low` ≤ cell < `high`, from values that are distances already, at the cells of `rows`;
@@ -102,9 +107,20 @@ impl LevelSet {
         let rows_within = rows.clipped(low, high);
         let phi = rows_within.resampled(rows, phi, BAND).into_iter().map(|phi| phi.clamp(-BAND, BAND)).collect();
         let stencil = Stencil::around(CellRows::default(), 1);
-        let mut set = Self { stencil, phi: Vec::new(), low, high };
+        let mut set = Self { stencil, phi: Vec::new(), low, high, open: [[false; 2]; 3] };
         set.store(&rows_within, phi, 0);
         set
+    }
+
+    /// The same with air beyond these sides, that follows liquid which moves away from them.
+    #[must_use]
+    pub(crate) fn open_at(mut self, open: OpenSides) -> Self {
+        if open != self.open {
+            self.open = open;
+            let (rows, phi) = (self.rows().clone(), std::mem::take(&mut self.phi));
+            self.store(&rows, phi, 0);
+        }
+        self
     }
 
     /// The stored cells.
@@ -133,6 +149,11 @@ impl LevelSet {
         PhiView { rows: self.rows(), phi: &self.phi, outside: BAND, low, high }
     }
 
+    /// The sides that let air in.
+    pub(crate) fn open_sides(&self) -> OpenSides {
+        self.open
+    }
+
     pub(crate) fn stencil(&self) -> &Stencil {
         &self.stencil
     }
@@ -146,7 +167,13 @@ impl LevelSet {
     pub fn advect(&mut self, flow: &impl Flow, reach: f32) {
         let (rows, phi) = (self.rows().clone(), std::mem::take(&mut self.phi));
         self.store(&rows, phi.clone(), reach.ceil() as i32);
-        let before = PhiView { rows: &rows, phi: &phi, ..self.view() };
+        let has_open = self.open.as_flattened().contains(&true);
+        // Beyond open sides is what the cells there say.
+        let beyond = |side: usize| std::array::from_fn(|axis| i32::from(self.open[axis][side]));
+        let [below, above]: [Cell; 2] = [beyond(0), beyond(1)];
+        let low = [0, 1, 2].map(|axis| self.low[axis] - below[axis]);
+        let high = [0, 1, 2].map(|axis| self.high[axis] + above[axis]);
+        let before = PhiView { rows: &rows, phi: &phi, outside: BAND, low, high };
         let far = far_from_surface(reach);
         let mut phi = std::mem::take(&mut self.phi);
         self.stencil.update([&mut phi], |runs, first, [phi]| {
@@ -154,16 +181,20 @@ impl LevelSet {
             for run in runs {
                 for n in 0..run.len as usize {
                     let value = &mut phi[run.at as usize + n - first];
-                    if value.abs() < far {
-                        let [x, y, z] = run.cell;
-                        let cell = [x + n as i32, y, z];
+                    let [x, y, z] = run.cell;
+                    let cell = [x + n as i32, y, z];
+                    let is_near_open = has_open && self.is_near_open(cell);
+                    if value.abs() < far || is_near_open {
                         let (at, way_here) = (cell.map(|x| x as f32 + 0.5), way_at(cell));
-                        if value.abs() > far_from_surface(length(way_here)) {
+                        if value.abs() > far_from_surface(length(way_here)) && !is_near_open {
                             continue;
                         }
                         let middle = sub(at, scale(way_here, 0.5));
                         let back = scale(way(middle), -1.0);
-                        let carried = sampler.at(add(at, back));
+                        let mut carried = sampler.at(add(at, back));
+                        if is_near_open {
+                            carried = carried.max(self.air_from(at, back));
+                        }
                         let is_reached = *value > 0.0 && carried <= 0.0;
                         // What is behind a thin solid does not come through it; φ above it is of this side.
                         *value = match if is_reached { flow.held(at, back, -1.0) } else { None } {
@@ -239,7 +270,7 @@ impl LevelSet {
 
     /// Replaces φ and chooses what is stored: the band, wider by `by` cells, the inside, and a ring around both.
     fn store(&mut self, rows: &CellRows, phi: Vec<f32>, by: i32) {
-        let near = rows.filtered(|_, at| phi[at].abs() < BAND);
+        let near = rows.filtered(|cell, at| phi[at].abs() < BAND || phi[at] < 0.0 && self.is_near_open(cell));
         let near = if by > 0 { near.dilated(by) } else { near };
         let active = near.clipped(self.low, self.high);
         let inside = rows.filtered(|_, at| phi[at] < 0.0).clipped(self.low, self.high);
@@ -249,9 +280,34 @@ impl LevelSet {
         self.copy_to_walls();
     }
 
-    /// Cells just beyond the domain get φ of the cell next to them, so that no surface is seen along walls.
+    /// How far beyond an open side that is behind it, in cells, the way of what comes to a place began; negative inside.
+    fn air_from(&self, at: Vec3, back: Vec3) -> f32 {
+        let mut farthest = -BAND;
+        for axis in 0..3 {
+            let from = at[axis] + back[axis];
+            let [below, above] = self.open[axis];
+            if below && back[axis] < 0.0 {
+                farthest = farthest.max(self.low[axis] as f32 - from);
+            }
+            if above && back[axis] > 0.0 {
+                farthest = farthest.max(from - self.high[axis] as f32);
+            }
+        }
+        farthest
+    }
+
+    /// Whether the air beyond an open side is in a cell's band.
+    fn is_near_open(&self, cell: Cell) -> bool {
+        (0..3).any(|axis| {
+            let depths = [cell[axis] - self.low[axis], self.high[axis] - 1 - cell[axis]];
+            (0..2).any(|side| self.open[axis][side] && depths[side] < BAND as i32)
+        })
+    }
+
+    /// Cells just beyond the domain get φ of the cell next to them, so that no surface is seen along walls; beyond open
+    /// sides it goes on, where the surface of air that has come in may be within half a cell of them.
     fn copy_to_walls(&mut self) {
-        let (low, high) = (self.low, self.high);
+        let (low, high, open) = (self.low, self.high, self.open);
         let within = |x: i32, axis: usize| x.clamp(low[axis], high[axis] - 1);
         let rows = self.stencil.rows();
         for ([y, z], spans) in rows.rows() {
@@ -265,7 +321,14 @@ impl LevelSet {
                 for x in if whole { all } else { ends }.into_iter().flatten() {
                     let inner = [within(x, 0), within(y, 1), within(z, 2)];
                     if inner != [x, y, z] {
-                        self.phi[span.at(x)] = rows.find(inner).map_or(BAND, |at| self.phi[at]);
+                        let phi = rows.find(inner).map_or(BAND, |at| self.phi[at]);
+                        let cell = [x, y, z];
+                        let is_open = |axis: usize| match cell[axis] {
+                            at if at < low[axis] => open[axis][0],
+                            at => at >= high[axis] && open[axis][1],
+                        };
+                        self.phi[span.at(x)] =
+                            if phi > -1.0 && (0..3).any(is_open) { (phi + 1.0).min(BAND) } else { phi };
                     }
                 }
             }

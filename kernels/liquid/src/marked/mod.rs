@@ -101,10 +101,12 @@ impl MarkedSurface {
         surface
     }
 
-    /// The same between the walls of a domain: where they are periodic, the surface repeats.
+    /// The same between the walls of a domain: where they are periodic, the surface repeats; where they are open, air comes
+    /// in as liquid moves away.
     #[must_use]
     pub fn within(self, domain: &Domain) -> Self {
-        Self { periods: domain.periods().refined(self.resolution), ..self }
+        let periods = domain.periods().refined(self.resolution);
+        Self { periods, set: self.set.open_at(domain.open_sides()), ..self }
     }
 
     /// The level set, in surface cells.
@@ -236,11 +238,12 @@ impl MarkedSurface {
         let rows = periods.with_images(own.clone(), margin);
         let mut phi = rows.resampled(self.set.rows(), self.set.phi(), BAND);
         periods.images(&rows).fill(&mut phi);
-        let mut set = LevelSet::new(&rows, &phi, outer[0], outer[1]);
+        let open = self.set.open_sides();
+        let mut set = LevelSet::new(&rows, &phi, outer[0], outer[1]).open_at(open);
         self.markers.repeat(periods, outer);
         f(&mut self.markers, &mut set);
         self.markers.retain_homes(periods);
-        self.set = LevelSet::new(set.rows(), set.phi(), low, high);
+        self.set = LevelSet::new(set.rows(), set.phi(), low, high).open_at(open);
     }
 
     /// After how many surface cells it repeats.

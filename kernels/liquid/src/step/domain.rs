@@ -2,7 +2,7 @@
 
 use numerics::vector::Vec3;
 
-use crate::level_set::outward;
+use crate::level_set::{OpenSides, outward};
 use crate::open_share::open_share;
 use crate::rows::{Cell, CellRows, Periods};
 use crate::velocity::{FaceFields, Site};
@@ -10,7 +10,7 @@ use crate::velocity::{FaceFields, Site};
 /// What a side of the domain is to the liquid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wall {
-    /// Liquid leaves through it into air of pressure 0.
+    /// Liquid leaves through it into air of pressure 0, and air comes in where liquid moves away.
     Open,
     /// A solid wall.
     #[default]
@@ -98,6 +98,11 @@ impl Domain {
     /// After how many cells the box repeats along each axis.
     pub fn periods(&self) -> Periods {
         Periods([0, 1, 2].map(|axis| if self.walls[axis][0] == Wall::Periodic { self.high[axis] } else { 0 }))
+    }
+
+    /// The sides that are open.
+    pub(crate) fn open_sides(&self) -> OpenSides {
+        self.walls.map(|walls| walls.map(|wall| wall == Wall::Open))
     }
 
     /// Whether the cell lies in the box.

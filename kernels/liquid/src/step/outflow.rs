@@ -15,7 +15,7 @@ use crate::velocity::Site;
 pub struct Outflow {
     /// The cell inside.
     pub cell: Cell,
-    /// m³; below 0 where liquid came in.
+    /// m³; air that comes in is none of it.
     pub volume: f64,
 }
 
@@ -88,12 +88,12 @@ impl OpenWall<'_> {
             let way = way(Site::FACES[self.axis].of(face));
             let out = outward * way[self.axis];
             let phi = self.view.rows.find(cell).map_or(self.view.outside, |at| self.view.phi[at]);
-            if out == 0.0 || phi > 1.0 + out.abs() {
+            if out <= 0.0 || phi > 1.0 + out {
                 return 0.0;
             }
             let corners = self.corners(face);
             let room = corners.map(|corner| self.solid.map_or(f32::MAX, |solid| solid.distance(corner)));
-            let looks = (LOOKS * out.abs()).ceil().clamp(1.0, MOST_LOOKS);
+            let looks = (LOOKS * out).ceil().clamp(1.0, MOST_LOOKS);
             let covered = |look: i32| {
                 let back = scale(way, (look as f32 + 0.5) / looks);
                 let mut inside = room;

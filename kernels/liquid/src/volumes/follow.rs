@@ -26,6 +26,8 @@ pub(super) struct Passage {
 const ENOUGH: usize = 8;
 /// Least share of a new piece's volume that is left for old pieces that are in others too.
 const LEAST_ROOM: f64 = 1e-3;
+/// Distance, in surface cells, up to which a place is in a piece.
+const HERE: f32 = 1.0;
 /// Volume, in cells, that a piece counts for at least.
 const LEAST_VOLUME: f64 = 1e-9;
 
@@ -125,21 +127,37 @@ impl VolumeTargets {
         (found, lost)
     }
 
-    /// Adds passages for old pieces that no marker was on because they fill all that holds them and have no surface to mark:
-    /// to such a piece where they were, at most as far off as they are large.
+    /// Adds passages for old pieces that no marker was on. Some fill all that holds them and have no surface to mark: to such a
+    /// piece where they were, at most as far off as they are large. Of others a source has replaced all of the surface: to the
+    /// piece that is where they were, if liquid came there and all of its markers are new.
     fn keep_unmarked(&self, surface: &MarkedSurface, found: &Pieces, passages: &mut Vec<Passage>) {
         let (unit, size) = (self.unit(surface), surface.resolution() as f32);
         let mut is_marked = vec![false; self.pieces.len()];
         for old in surface.markers().pieces().iter().filter(|old| **old != NO_PIECE) {
             is_marked[*old as usize] = true;
         }
+        let mut is_new = self.added_to(found, size);
+        passages.iter().for_each(|passage| is_new[passage.new] = false);
         for (old, piece) in self.pieces.iter().enumerate().filter(|(old, _)| !is_marked[*old]) {
-            let near = |(_, away): &(usize, f32)| f64::from(*away) <= libm::cbrt(piece.measured / unit);
-            match found.closest(scale(piece.place, size)).filter(near) {
-                Some((new, _)) if found.all[new].area <= 0.0 => passages.push(Passage { old, new, markers: 1 }),
-                _ => {}
+            let Some((new, away)) = found.closest(scale(piece.place, size)) else { continue };
+            let fills_all = found.all[new].area <= 0.0 && f64::from(away) <= libm::cbrt(piece.measured / unit);
+            let is_renewed = is_new[new] && away < HERE;
+            if fills_all || is_renewed {
+                passages.push(Passage { old, new, markers: 1 });
             }
         }
+    }
+
+    /// Whether liquid came beside each piece. `size`: surface cells along the side of a solver cell.
+    fn added_to(&self, found: &Pieces, size: f32) -> Vec<bool> {
+        let mut is_added = vec![false; found.all.len()];
+        for change in self.changes.iter().filter(|change| change.volume > 0.0) {
+            let closest = change.at.and_then(|at| found.closest(scale(at, size)));
+            if let Some((piece, _)) = closest.filter(|(_, distance)| *distance < BESIDE) {
+                is_added[piece] = true;
+            }
+        }
+        is_added
     }
 
     /// Adds passages for pieces that no marker was on: from the piece that most markers around were on. Returns those that
@@ -148,12 +166,7 @@ impl VolumeTargets {
         let size = surface.resolution() as f32;
         let mut has_origin = vec![false; found.all.len()];
         passages.iter().for_each(|passage| has_origin[passage.new] = true);
-        for change in self.changes.iter().filter(|change| change.volume > 0.0) {
-            let closest = change.at.and_then(|at| found.closest(scale(at, size)));
-            if let Some((piece, _)) = closest.filter(|(_, distance)| *distance < BESIDE) {
-                has_origin[piece] = true;
-            }
-        }
+        self.added_to(found, size).iter().zip(&mut has_origin).for_each(|(is_added, has)| *has |= is_added);
         let mut unknown = Vec::new();
         for new in (0..found.all.len()).filter(|piece| !has_origin[*piece]) {
             let around = found.cells_around(new, BESIDE as i32);

@@ -77,3 +77,57 @@ fn each_of_two_liquids_keeps_its_volume() {
     let drift: Vec<f64> = out.iter().map(|frame| metric(frame, MATERIAL_DRIFT)).collect();
     assert!(drift.iter().all(|drift| *drift < 0.05), "{drift:?}");
 }
+
+/// A slab under an open ceiling falls: air follows it.
+#[test]
+fn no_liquid_comes_in_through_an_open_ceiling() {
+    let slab = solving(cuboid([-1.0, 0.7, -1.0], [2.0, 2.0, 2.0])).set(WALL_Y_MAX, Walls::Open).set(VISCOSITY, 0.0);
+    let out = slab.frames(1..=6);
+    for frame in &out[1..] {
+        let share = metric(frame, VOLUME_NOW) / metric(&out[0], VOLUME_NOW);
+        assert!((share - 1.0).abs() < 0.05 && metric(frame, LEFT_DOMAIN).abs() < 1e-9, "{:?}", frame.metrics);
+    }
+}
+
+/// A ball that a source makes where nothing moves grows by all that the source gives, from when cells can show it.
+#[test]
+fn a_source_without_gravity_makes_a_ball_of_its_volume() {
+    let body = with(ball([0.5; 3], 0.25), &[(SOURCE_RATE, 0.02)]);
+    let bench = bench(&NODE).input(SOURCES, body).set(CELL, 1.0 / 16.0).set(DOMAIN_FROM, [0.0; 3]);
+    let out = bench.set(DOMAIN_TO, [1.0; 3]).set(GRAVITY, [0.0; 3]).set(VISCOSITY, 1000.0).frames(1..=13);
+    let shares: Vec<f64> = out[5..].iter().map(|frame| metric(frame, VOLUME_NOW) / metric(frame, SOURCED)).collect();
+    assert!(shares.iter().all(|share| (share - 1.0).abs() < 0.05), "{shares:?}");
+    assert!(out[1..].iter().all(|frame| metric(frame, SPRAY) == 0.0));
+    assert!((metric(&out[12], SOURCED) / (0.02 * 12.0 * H) - 1.0).abs() < 0.05, "{:?}", out[12].metrics);
+}
+
+/// A drop of spray keeps its id while it flies: nobody else gets it.
+#[test]
+fn drops_keep_their_ids() {
+    let block = solving(cuboid([0.25, 0.3, 0.25], [0.75, 0.7, 0.75]))
+        .set(INITIAL_VELOCITY, [0.0, -8.0, 0.0])
+        .set(VISCOSITY, 0.001)
+        .set(MAX_SUBSTEPS, 1);
+    let drops = |frame: i64| -> Vec<(i32, f32)> {
+        let particles = particles_at(&block, frame);
+        let ids = particles.get(ID).unwrap();
+        let mut unique = ids.to_vec();
+        unique.sort_unstable();
+        unique.dedup();
+        assert_eq!(unique.len(), ids.len());
+        let rows = particles.get(PARTICLE_KIND).unwrap().iter().zip(ids).zip(particles.get(PARTICLE_VOLUME).unwrap());
+        rows.filter(|((kind, _), _)| **kind == PARTICLE_SPRAY).map(|((_, id), volume)| (*id, *volume)).collect()
+    };
+    let (mut stayed, mut last) = (0, Vec::new());
+    for frame in 2..=12 {
+        let now = drops(frame);
+        for (id, volume) in &now {
+            if let Some((_, before)) = last.iter().find(|(before, _)| before == id) {
+                assert_eq!(volume, before, "frame {frame}, {id}");
+                stayed += 1;
+            }
+        }
+        last = now;
+    }
+    assert!(stayed > 5, "{stayed}");
+}

@@ -118,3 +118,63 @@ fn a_rate_that_is_too_little_for_the_grid_is_collected_and_told() {
     assert_eq!(collecting[..2], [1.0, 1.0]);
     assert!(metric(&out[8], SOURCED) > 0.5 * 8.0 * 0.01 * H, "{collecting:?}");
 }
+
+#[test]
+fn a_rate_that_falls_to_0_is_noted() {
+    let body = |rate: f32| with(ball([0.5, 0.6, 0.5], 0.15), &[(SOURCE_RATE, rate)]);
+    let ends = bench(&NODE)
+        .moving(SOURCES, move |frame| body(if frame.number() < 3.0 { 0.02 } else { 0.0 }).into())
+        .set(CELL, 1.0 / 16.0)
+        .set(DOMAIN_FROM, [0.0; 3])
+        .set(DOMAIN_TO, [1.0; 3]);
+    let ended: Vec<f64> = ends.frames(1..=5).iter().skip(1).map(|frame| metric(frame, RATE_ENDED)).collect();
+    assert_eq!(ended, [0.0, 0.0, 1.0, 1.0]);
+    let full = solving(cuboid([0.2; 3], [0.4; 3])).input(SOURCES, body(0.0)).frames(1..=3);
+    assert_eq!(metric(&full[2], RATE_ENDED), 0.0);
+}
+
+#[test]
+fn what_a_source_says_in_vain_is_noted() {
+    let shape = || ball([0.5; 3], 0.2);
+    let in_vain = |bench: Bench| metric(&bench.frames(1..=1)[0], IN_VAIN);
+    let mut thrown = shape();
+    thrown.set(SOURCE_VELOCITY, vec![[1.0, 0.0, 0.0]]).unwrap();
+    let mut off = shape();
+    off.set(SOURCE_ACTIVE, vec![0]).unwrap();
+    let rated = || with(shape(), &[(SOURCE_RATE, 0.1)]);
+    for mesh in [thrown, off, rated()] {
+        assert_eq!(in_vain(solving(mesh)), 1.0);
+    }
+    assert_eq!(in_vain(solving(with(shape(), &[(SOURCE_RATE, 0.0), (SOURCE_VISCOSITY, 3.0)]))), 0.0);
+    // The same mesh is the source, which starts full.
+    assert_eq!(in_vain(solving(rated()).input(SOURCES, rated())), 0.0);
+}
+
+#[test]
+fn attributes_that_clash_are_noted() {
+    let value = |width: usize| match width {
+        1 => Column::new(vec![1.5_f32]),
+        _ => Column::new(vec![[1.0_f32, 2.0, 3.0]]),
+    };
+    for (width, clashes) in [(1, 1.0), (3, 0.0)] {
+        let mut pool = cuboid([-1.0; 3], [2.0, 0.43, 2.0]);
+        pool.set(Attr::<[f32; 3]>::point("q"), vec![[1.0, 2.0, 3.0]; 8]).unwrap();
+        let mut tracers = Component::points(vec![[0.5, 0.2, 0.5]]);
+        tracers.set_column(Owner::Point, "q", value(width)).unwrap();
+        let out = solving(pool).input(TRACERS, tracers).frames(1..=2);
+        assert_eq!(out.iter().map(|frame| metric(frame, CLASHES)).collect::<Vec<_>>(), [clashes; 2]);
+    }
+}
+
+/// One step of single precision is 1/4 m from 2^21 m on, four cells here.
+#[test]
+fn a_liquid_far_from_the_origin_is_noted() {
+    for (x, step) in [(0.0, 0.0), (2_097_152.0, 4.0)] {
+        let block = cuboid([x, 0.25, 0.25], [x + 1.0, 0.75, 0.75]);
+        let from = f64::from(x);
+        let out =
+            solving(block).set(DOMAIN_FROM, [from, 0.0, 0.0]).set(DOMAIN_TO, [from + 1.0, 1.0, 1.0]).frames(1..=1);
+        let found = metric(&out[0], POSITION_STEP);
+        assert!((found - step).abs() < 1e-4, "{found}");
+    }
+}
