@@ -122,7 +122,7 @@ params! { PARAMS:
         .at_least(0.0).soft(0.0, 3.0).when(couples);
     THICKNESS: Param<f32> = Param::float("thickness", 1e-3,
         "Distance that surfaces keep from each other. A tenth of the tets' edge length is cheap; smaller values take \
-         more time steps.")
+         more time steps. What starts closer, or is when this grows, is moved away over 12 frames.")
         .unit(Unit::Metres).above(0.0).soft(1e-4, 1e-2);
     FRICTION: Param<Maskable> = Param::maskable("friction", 0.5,
         "Coefficient of friction: at 0 bodies slide freely, at 1 they stick to a slope of 45 degrees.")

@@ -13,7 +13,7 @@
 
 use super::obstacle::narrow;
 use super::surface::{Moment, TriangleSurface};
-use super::{BodySkin, CollisionScene, Obstacle};
+use super::{BodySkin, Closeness, CollisionScene, Obstacle};
 use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
 use crate::tets::{Enclosure, Exit, bounds};
 use numerics::closest_point::ClosestPoint;
@@ -54,11 +54,15 @@ pub struct Overlap {
     pub depth: f64,
 }
 
-/// How overlapping bodies are pushed apart in a frame.
-#[derive(Clone, Copy, Debug)]
+/// How bodies that overlap or are too close are pushed apart in a frame.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Separation<'a> {
     /// The overlaps at the start.
     pub overlaps: &'a [Overlap],
+    /// What is too close at the start.
+    pub close: &'a [Closeness],
+    /// By how much all contacts yield at the start and the end of the frame because the distance to keep grew, metres.
+    pub grown: [f64; 2],
     /// Number of frames in which they are to come apart.
     pub frames: u32,
     /// Number of those that are over.

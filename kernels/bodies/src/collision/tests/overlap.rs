@@ -31,7 +31,7 @@ fn a_body_leaves_an_obstacle_the_shortest_way() {
     assert!((depth - 0.021).abs() < 1e-7 && (direction[1] - 1.0).abs() < 1e-12, "{found:?}");
 
     // In the second quarter of the fourth of twelve frames nothing has moved yet, so it has to catch up.
-    let separation = Some(Separation { overlaps: &found, frames: 12, over: 3, seconds: 0.04 });
+    let separation = Some(Separation { overlaps: &found, frames: 12, over: 3, seconds: 0.04, ..Separation::default() });
     let scene = CollisionScene { separation, ..scene };
     let contacts = self::find(&scene, &body.0, &body.0, [0.25, 0.5]);
     assert_eq!(contacts.len(), 25);
@@ -41,7 +41,8 @@ fn a_body_leaves_an_obstacle_the_shortest_way() {
         assert!((contact.offset - (0.02 - left)).abs() < 1e-7 && contact.normal == [0.0, 1.0, 0.0], "{contact:?}");
         assert!((contact.velocity[1] - (0.021 - left) / 0.01).abs() < 1e-6 && contact.friction == 0.0, "{contact:?}");
     }
-    let separation = Some(Separation { overlaps: &found, frames: 12, over: 12, seconds: 0.04 });
+    let separation =
+        Some(Separation { overlaps: &found, frames: 12, over: 12, seconds: 0.04, ..Separation::default() });
     let after = self::find(&CollisionScene { separation, ..scene }, &body.0, &body.0, [0.0, 1.0]);
     assert!(after.iter().all(|contact| contact.friction > 0.0), "contacts are ordinary again");
 }
@@ -90,4 +91,48 @@ fn overlaps_are_found_with_the_ground_and_other_bodies_only_where_they_are() {
     // A point in the middle of the face of the first that is 30 mm inside the second.
     let penetration = CollisionScene { ground: ground(0.0), ..scene }.penetration(&all);
     assert!((penetration.deepest - 0.031).abs() < 1e-6 && penetration.inside >= 8, "{penetration:?}");
+}
+
+/// What is closer than the distance to keep is found, and contacts yield by what is missing of it, a twelfth less a frame.
+#[test]
+fn contacts_of_what_starts_too_close_yield_evenly_less() {
+    let body = block([2; 3], 0.05, [0.0, 0.4e-3, 0.0]);
+    let skins = [skin(&body)];
+    let (points, triangles) = cuboid([1.0; 3]);
+    let points: Vec<[f64; 3]> = points.iter().map(|p| [p[0], p[1] - 0.5, p[2]]).collect();
+    let obstacles =
+        |kept: usize| [Obstacle::new(&triangles[..kept], &[pose(0.0, &points)], 1.0, THICKNESS, 0.5).unwrap()];
+    let (closed, open) = (obstacles(triangles.len()), obstacles(triangles.len() - 1));
+    let empty = CollisionScene { skins: &skins, ..CollisionScene::default() };
+    let with = |obstacles| CollisionScene { obstacles, ..empty };
+    for (scene, is_open, partner) in [
+        (CollisionScene { ground: ground(0.0), ..empty }, false, OverlapPartner::Ground),
+        (with(&closed), false, OverlapPartner::Obstacle(0)),
+        (with(&open), true, OverlapPartner::Obstacle(0)),
+    ] {
+        let close = scene.too_close(&body.0, &[]);
+        let [Closeness { skin: 0, partner: found, missing }] = close[..] else { panic!("{close:?}") };
+        assert!(found == partner && (missing - 0.6e-3).abs() < 1e-6, "{close:?}");
+        let at = |over: u32, times: [f64; 2]| {
+            let separation = Separation { close: &close, frames: 12, over, seconds: 0.04, ..Separation::default() };
+            let scene = CollisionScene { separation: Some(separation), ..scene };
+            self::find(&scene, &body.0, &body.0, times).into_iter().filter(|c| c.normal[1] > 0.9).collect::<Vec<_>>()
+        };
+        let contacts = at(3, [0.0, 0.5]);
+        assert!(contacts.len() >= 6, "{}", contacts.len());
+        for contact in contacts {
+            let left = missing * (1.0 - 3.5 / 12.0);
+            assert!((contact.gap + contact.offset - (THICKNESS - left)).abs() < 1e-7, "{contact:?}");
+            assert!((contact.velocity[1] - missing / 12.0 / 0.04).abs() < 1e-7, "{contact:?}");
+            assert!(!is_open || contact.offset.abs() < 1e-7, "an open one keeps its side: {contact:?}");
+        }
+        for contact in at(12, [0.0, 1.0]) {
+            assert!(
+                (contact.gap + contact.offset - THICKNESS).abs() < 1e-7 && contact.velocity[1] == 0.0,
+                "{contact:?}"
+            );
+        }
+    }
+    let apart = block([2; 3], 0.05, [0.0, THICKNESS, 0.0]);
+    assert_eq!(CollisionScene { ground: ground(0.0), ..empty }.too_close(&apart.0, &[]), vec![]);
 }
