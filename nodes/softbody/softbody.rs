@@ -19,6 +19,7 @@ use crate::shared::attributes::{
 };
 use run::Run;
 
+mod carried;
 mod goals;
 mod joints;
 mod measured;
@@ -160,10 +161,15 @@ params! { PARAMS:
 const SURFACE: Output = Output::new(
     "surface",
     &[Kind::Mesh],
-    "The surface meshes that came with the tets, moved with them, attributes included; the boundary of the tets if \
-     there were none.",
+    "The surface meshes that came with the tets, moved with them; the boundary of the tets if there were none. \
+     Attributes come along: `v` is the velocity of the simulation, `N` turns with the surface, `orient` is left out.",
 );
-const TETS: Output = Output::new("tets", &[Kind::Tets], "The tets, in their simulated positions.");
+const TETS: Output = Output::new(
+    "tets",
+    &[Kind::Tets],
+    "The tets, in their simulated positions, with velocities `v`. `surface_point` \
+    and `body` count on over all bodies; `N` and `orient` are left out.",
+);
 
 metrics! { METRICS:
     NEWTON = Metric::new("newton", Unit::None, "Newton iterations in the frame.");
@@ -328,7 +334,7 @@ pub(crate) static NODE: Node = Node::new(
     &PIN_STRENGTH,
     &PIN_RELEASE,
 ])
-.writes(&[&P, &BODY_NUMBER])
+.writes(&[&P, &V, &N, &SURFACE_POINT, &BODY_NUMBER])
 .metrics(METRICS)
 .leaves_out(leaves_out);
 

@@ -23,7 +23,7 @@ use super::{
     STARTED_IN_COLLIDERS, STARTED_INSIDE, STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS,
     TIME_SCALE, TOLERANCE, VOLUME,
 };
-use super::{obstacles, pins};
+use super::{carried, obstacles, pins};
 
 /// The state of the simulation.
 #[derive(Serialize, Deserialize)]
@@ -139,6 +139,12 @@ impl Chain for Run {
         surface
             .set(P, setup.carriers.iter().map(|carrier| narrow(carrier.position(&self.state.positions))).collect())?;
         tets.set(P, self.state.positions.iter().map(|p| narrow(*p)).collect())?;
+        let scale = f64::from(cx.get(TIME_SCALE));
+        let velocity = |v: [f64; 3]| narrow(v.map(|v| v * scale));
+        let carried = setup.carriers.iter().map(|carrier| velocity(carrier.position(&self.state.velocities))).collect();
+        carried::follow(cx, &setup.surface, &mut surface, carried)?;
+        let own = self.state.velocities.iter().map(|v| velocity(*v)).collect();
+        carried::follow(cx, &setup.body, &mut tets, own)?;
         Ok(SURFACE.with(Geometry::from(surface)).and(TETS, Geometry::from(tets)))
     }
 }
