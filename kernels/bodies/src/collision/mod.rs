@@ -190,6 +190,7 @@ impl CollisionScene<'_> {
                     velocity: (up * speed).into(),
                     friction: ground.friction * self.friction_scale(&[*particle], &[1.0]),
                     jammed: false,
+                    open: false,
                 }));
             }
         }
@@ -418,6 +419,7 @@ impl SkinObstaclePair<'_> {
             velocity: (self.obstacle.velocity_of(times[1], points, shares) + stopping).into(),
             friction: self.obstacle.friction * self.scene.friction_scale(&own, &weights),
             jammed: -normal.dot(&raised_end) > JAMMED * gap,
+            open: !self.obstacle.surface.closed,
         };
         if self.obstacle.surface.closed { self.yielding.of(contact) } else { self.yielding.of_open(contact) }
     }

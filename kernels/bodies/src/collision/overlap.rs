@@ -281,7 +281,7 @@ impl CollisionScene<'_> {
     ) -> Contact {
         let (allowed, speed) = self.allowed(overlap, exit.distance + gap, query.times);
         let (velocity, normal) = ((normal * speed).into(), normal.into());
-        Contact { points, weights, normal, offset: -allowed, gap, velocity, friction: 0.0, jammed: false }
+        Contact { points, weights, normal, offset: -allowed, gap, velocity, friction: 0.0, jammed: false, open: false }
     }
 
     fn out_of_skin(&self, query: &ContactQuery<'_>, overlap: &Overlap, other: &BodySkin, out: &mut Vec<Contact>) {

@@ -197,6 +197,7 @@ impl Pair<'_> {
             velocity: [0.0; 3],
             friction: self.params.friction * self.scene.friction_scale(&points, &weights),
             jammed: false,
+            open: false,
         }))
     }
 }
