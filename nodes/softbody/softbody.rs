@@ -229,8 +229,8 @@ metrics! { METRICS:
     POINTS_INSIDE = Metric::new("points_inside", Unit::None,
         "Particles and surface points of the output that lie inside a closed collider or another body.");
     DEEPEST_PENETRATION = Metric::new("deepest_penetration", Unit::Metres,
-        "By how much `deepest_overlap` exceeds `thickness`: how far surfaces went through each other. 0 until all that \
-         started inside has been pushed out.")
+        "By how much `deepest_overlap` exceeds `thickness`: how far points, or edges, went through surfaces of colliders \
+         and other bodies. 0 until all that started inside has been pushed out.")
         .warn_above(0.0, "Surfaces went through each other. Set more `substeps`, slow the colliders, leave more room \
             between them, or raise `thickness`.");
     JAMMED = Metric::new("jammed", Unit::None,

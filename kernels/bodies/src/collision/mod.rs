@@ -21,6 +21,7 @@ mod motion;
 mod obstacle;
 mod overlap;
 mod pair;
+mod piercing;
 mod surface;
 mod vertex;
 

@@ -374,6 +374,12 @@ impl CollisionScene<'_> {
                 found.deepest = found.deepest.max(gap + distance);
             }
         }
+        let pierced = self.deepest_piercing(x);
+        let gaps = self.obstacles.iter().map(|obstacle| obstacle.thickness);
+        let gap = gaps.chain(self.body_contact.map(|contact| contact.thickness)).fold(0.0, f64::max);
+        if pierced > TOUCHING * gap {
+            found.deepest = found.deepest.max(gap + pierced);
+        }
         found.inside = inside.iter().filter(|inside| **inside).count();
         found
     }

@@ -93,6 +93,40 @@ fn overlaps_are_found_with_the_ground_and_other_bodies_only_where_they_are() {
     assert!((penetration.deepest - 0.031).abs() < 1e-6 && penetration.inside >= 8, "{penetration:?}");
 }
 
+/// A rod of 20 mm through two edges of a cube of 0.1 m, along its upper left edge at x = 0 and y = 0.05: no point of one is
+/// inside the other. The edges are 10 mm deep in the rod, and two edges of the rod are as deep in the cube.
+#[test]
+fn edges_that_go_through_something_are_measured() {
+    let body = block([1; 3], 0.1, [0.0; 3]);
+    let skins = [skin(&body)];
+    let (points, triangles) = cuboid([0.02, 0.02, 1.0]);
+    let deepest = |x: f64, kept: usize| {
+        let points: Vec<[f64; 3]> = points.iter().map(|p| [p[0] + x, p[1] + 0.05, p[2] + 0.05]).collect();
+        let obstacle = Obstacle::new(&triangles[..kept], &[pose(0.0, &points)], 1.0, THICKNESS, 0.5).unwrap();
+        let scene = CollisionScene { skins: &skins, obstacles: &[obstacle], ..CollisionScene::default() };
+        let found = scene.penetration(&body.0);
+        assert_eq!(found.inside, 0);
+        found.deepest
+    };
+    assert!((deepest(0.0, triangles.len()) - (THICKNESS + 0.01)).abs() < 1e-6, "{}", deepest(0.0, triangles.len()));
+    assert_eq!(deepest(-0.012, triangles.len()), 0.0, "it is 2 mm beside the cube");
+    assert!((deepest(-0.0105, triangles.len()) - 0.5e-3).abs() < 1e-6, "it is 0.5 mm beside the cube");
+
+    // Two bodies, of which one has the shape of the rod.
+    let rod = block([1; 3], 0.02, [-0.01, 0.04, 0.04]);
+    let rod: super::bodies::Block =
+        (rod.0.iter().map(|p| [p[0], p[1], 50.0 * (p[2] - 0.05) + 0.05]).collect(), rod.1, rod.2);
+    let first = body.0.len() as u32;
+    let all: Vec<[f64; 3]> = body.0.iter().chain(&rod.0).copied().collect();
+    let shifted: Vec<[u32; 3]> = rod.2.iter().map(|face| face.map(|corner| corner + first)).collect();
+    let links: Vec<[u32; 2]> =
+        (0..first).map(|point| [0, point]).chain((first..2 * first).map(|p| [first, p])).collect();
+    let skins = BodySkin::several(&all, &[], &[&body.2, &shifted], &links).unwrap();
+    let body_contact = Some(ContactParams { thickness: THICKNESS, friction: 0.5 });
+    let found = CollisionScene { skins: &skins, body_contact, ..CollisionScene::default() }.penetration(&all);
+    assert!((found.deepest - (THICKNESS + 0.01)).abs() < 1e-6 && found.inside == 0, "{found:?}");
+}
+
 /// What is closer than the distance to keep is found, and contacts yield by what is missing of it, a twelfth less a frame.
 #[test]
 fn contacts_of_what_starts_too_close_yield_evenly_less() {
