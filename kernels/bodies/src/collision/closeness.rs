@@ -112,7 +112,8 @@ impl CollisionScene<'_> {
                     None => (first.min(second), OverlapPartner::Skin(first.max(second))),
                 };
                 let missing = contact.depth(x);
-                if !(missing > TOUCHING * contact.gap)
+                if !missing.is_finite()
+                    || missing <= TOUCHING * contact.gap
                     || overlaps.iter().any(|overlap| (overlap.skin, overlap.partner) == (skin, partner))
                 {
                     continue;

@@ -130,7 +130,7 @@ impl Still<'_> {
 fn crossing([p, q]: [DVec3; 2], [a, b, c]: [DVec3; 3]) -> Option<(f64, [f64; 2])> {
     let normal = (b - a).cross(&(c - a)).try_normalize(0.0)?;
     let sides = [p, q].map(|end| normal.dot(&(end - a)));
-    if !(sides[0] * sides[1] < 0.0) {
+    if (sides[0] < 0.0) == (sides[1] < 0.0) || sides.contains(&0.0) {
         return None;
     }
     let way = q - p;
