@@ -19,6 +19,7 @@ use crate::shared::attributes::{
 };
 use run::Run;
 
+mod carried;
 mod goals;
 mod joints;
 mod measured;
@@ -58,7 +59,8 @@ inputs! { INPUTS:
         "Bodies from Tetrahedralize, in their initial positions. A surface mesh that comes with the tets is carried \
          along by them and makes the contacts; without one, the boundary of the tets is the surface.").read_at(|_| Times::START);
     COLLIDERS: Input<Many> = Input::many("colliders", Kind::Mesh,
-        "Meshes that bodies collide with: hands, rolling pins, bowls. They may move, rotate and deform.")
+        "Meshes that bodies collide with: hands, rolling pins, bowls. They may move, rotate and deform; numbered files \
+         move evenly from frame to frame.")
         .read_at(|_| Times::within_step(COLLIDER_SAMPLES));
     GOALS: Input<Many> = Input::many("goals", Kind::Tets,
         "Target shapes from Softbody_Goal. A body moves from one goal to the next and reaches each at the frame set \
@@ -123,7 +125,7 @@ params! { PARAMS:
         .at_least(0.0).soft(0.0, 3.0).when(couples);
     THICKNESS: Param<f32> = Param::float("thickness", 1e-3,
         "Distance that surfaces keep from each other. A tenth of the tets' edge length is cheap; smaller values take \
-         more time steps.")
+         more time steps. What starts closer, or is when this grows, is moved away over 12 frames.")
         .unit(Unit::Metres).above(0.0).soft(1e-4, 1e-2);
     FRICTION: Param<Maskable> = Param::maskable("friction", 0.5,
         "Coefficient of friction: at 0 bodies slide freely, at 1 they stick to a slope of 45 degrees.")
@@ -160,10 +162,15 @@ params! { PARAMS:
 const SURFACE: Output = Output::new(
     "surface",
     &[Kind::Mesh],
-    "The surface meshes that came with the tets, moved with them, attributes included; the boundary of the tets if \
-     there were none.",
+    "The surface meshes that came with the tets, moved with them; the boundary of the tets if there were none. \
+     Attributes come along: `v` is the velocity of the simulation, `N` turns with the surface, `orient` is left out.",
 );
-const TETS: Output = Output::new("tets", &[Kind::Tets], "The tets, in their simulated positions.");
+const TETS: Output = Output::new(
+    "tets",
+    &[Kind::Tets],
+    "The tets, in their simulated positions, with velocities `v`. `surface_point` \
+    and `body` count on over all bodies; `N` and `orient` are left out.",
+);
 
 metrics! { METRICS:
     NEWTON = Metric::new("newton", Unit::None, "Newton iterations in the frame.");
@@ -223,8 +230,8 @@ metrics! { METRICS:
     POINTS_INSIDE = Metric::new("points_inside", Unit::None,
         "Particles and surface points of the output that lie inside a closed collider or another body.");
     DEEPEST_PENETRATION = Metric::new("deepest_penetration", Unit::Metres,
-        "By how much `deepest_overlap` exceeds `thickness`: how far surfaces went through each other. 0 until all that \
-         started inside has been pushed out.")
+        "By how much `deepest_overlap` exceeds `thickness`: how far points, or edges, went through surfaces of colliders \
+         and other bodies. 0 until all that started inside has been pushed out.")
         .warn_above(0.0, "Surfaces went through each other. Set more `substeps`, slow the colliders, leave more room \
             between them, or raise `thickness`.");
     JAMMED = Metric::new("jammed", Unit::None,
@@ -338,7 +345,7 @@ pub(crate) static NODE: Node = Node::new(
     &PIN_STRENGTH,
     &PIN_RELEASE,
 ])
-.writes(&[&P, &BODY_NUMBER])
+.writes(&[&P, &V, &N, &SURFACE_POINT, &BODY_NUMBER])
 .metrics(METRICS)
 .leaves_out(leaves_out)
 .integrates(|params| params.get(GRAVITY).map(f64::from))

@@ -113,6 +113,7 @@ impl ContactFinder for SceneContacts<'_> {
                         velocity: after.velocity.into(),
                         friction: FRICTION,
                         jammed: false,
+                        open: false,
                     });
                 }
             }

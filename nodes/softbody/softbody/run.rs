@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use bodies::collision::{
-    CaughtParticle, CollisionScene, ContactParams, Ground, Obstacle, Overlap, OverlapPartner, Separation,
+    CaughtParticle, Closeness, CollisionScene, ContactParams, Ground, Obstacle, Overlap, OverlapPartner, Separation,
 };
 use bodies::mass_spring::{
     BodySolver, FrameReport, GoalSpring, Integrator, Pin, Plasticity, SoftBody, SolverFrame, State, flow, reset, tear,
@@ -22,9 +22,9 @@ use super::{
     PLASTIC_CREEP, PLASTIC_WORK, PLASTIC_YIELD, POINTS_INSIDE, RESET_ENERGY, RESET_FRAMES, RESET_TO_GOALS,
     SELF_COLLISION, SEPARATION_FRAMES, SOFTEST_DIRECTION, START_FRAME, STARTED_IN_BODIES, STARTED_IN_BODIES_OTHER,
     STARTED_IN_BODIES_WIRE, STARTED_IN_COLLIDERS, STARTED_INSIDE, STIFFEST_DIRECTION, STIFFEST_DIRECTION_WIRE,
-    STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS, TOLERANCE, VOLUME,
+    STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS, TIME_SCALE, TOLERANCE, VOLUME,
 };
-use super::{obstacles, pins};
+use super::{carried, obstacles, pins};
 
 /// The state of the simulation.
 #[derive(Serialize, Deserialize)]
@@ -34,7 +34,10 @@ pub(super) struct Run {
     goals: GoalHistory,
     /// What overlapped at the start, until it is out, and the number of frames since in which time passed.
     overlaps: Vec<Overlap>,
+    /// What is too close at the start, for as long as contacts yield for it.
+    close: Vec<Closeness>,
     frames_over: u32,
+    thickness: Thickness,
     caught: Vec<CaughtParticle>,
     /// Metrics of the last step, or of the start.
     metrics: MetricValues,
@@ -51,6 +54,33 @@ struct Solving {
     solver: BodySolver,
     /// The body's density, stiffness and damping.
     values: [f32; 3],
+}
+
+/// How contacts follow a distance to keep that grows.
+#[derive(Default, Serialize, Deserialize)]
+struct Thickness {
+    /// That of the last frame, metres.
+    reached: f64,
+    /// What contacts still yield of it, metres, and the number of frames until they no longer do.
+    missing: f64,
+    frames: u32,
+}
+
+impl Thickness {
+    /// By how much contacts yield at the start and the end of a frame of `seconds` that keeps the distance `thickness`.
+    fn yielding(&mut self, thickness: f64, seconds: f64) -> [f64; 2] {
+        if thickness > self.reached {
+            (self.missing, self.frames) = (self.missing + thickness - self.reached, SEPARATION_FRAMES);
+        }
+        self.reached = thickness;
+        self.missing = self.missing.min(thickness);
+        let start = self.missing;
+        if seconds > 0.0 && self.frames > 0 {
+            self.missing -= self.missing / f64::from(self.frames);
+            self.frames -= 1;
+        }
+        [start, self.missing]
+    }
 }
 
 /// A step between two frames, or the start, which takes no time.
@@ -82,7 +112,9 @@ impl Chain for Run {
             state,
             goals: GoalHistory::default(),
             overlaps: Vec::new(),
+            close: Vec::new(),
             frames_over: 0,
+            thickness: Thickness::default(),
             caught: Vec::new(),
             metrics: MetricValues::default(),
             setup: OnceLock::from(Arc::new(setup)),
@@ -111,6 +143,12 @@ impl Chain for Run {
         surface
             .set(P, setup.carriers.iter().map(|carrier| narrow(carrier.position(&self.state.positions))).collect())?;
         tets.set(P, self.state.positions.iter().map(|p| narrow(*p)).collect())?;
+        let scale = f64::from(cx.get(TIME_SCALE));
+        let velocity = |v: [f64; 3]| narrow(v.map(|v| v * scale));
+        let carried = setup.carriers.iter().map(|carrier| velocity(carrier.position(&self.state.velocities))).collect();
+        carried::follow(cx, &setup.surface, &mut surface, carried)?;
+        let own = self.state.velocities.iter().map(|v| velocity(*v)).collect();
+        carried::follow(cx, &setup.body, &mut tets, own)?;
         Ok(SURFACE.with(Geometry::from(surface)).and(TETS, Geometry::from(tets)))
     }
 }
@@ -140,13 +178,17 @@ impl Run {
             set_overlaps(&setup, &overlaps, &mut self.metrics);
             self.metrics.set(CARRIED_OUTSIDE, setup.carried_outside() as f64);
             set_evenness(&setup, &solving.body, &mut self.metrics);
+            self.close = scene.too_close(&setup.contact_points(&self.state.positions), &overlaps);
             self.overlaps = overlaps;
+            self.thickness.reached = rub.thickness;
         }
-        let mut overlaps = std::mem::take(&mut self.overlaps);
+        let grown = self.thickness.yielding(rub.thickness, interval.seconds);
+        let (mut overlaps, close) = (std::mem::take(&mut self.overlaps), std::mem::take(&mut self.close));
         let (over, seconds) = (self.frames_over, interval.seconds);
         let caught = std::mem::take(&mut self.caught);
         scene.caught = &caught;
-        scene.separation = Some(Separation { overlaps: &overlaps, frames: SEPARATION_FRAMES, over, seconds });
+        scene.separation =
+            Some(Separation { overlaps: &overlaps, close: &close, grown, frames: SEPARATION_FRAMES, over, seconds });
         let mut goals = std::mem::take(&mut self.goals);
         let mut influences = self.influences(cx, &setup, &mut goals, interval)?;
         let before = setup.contact_points(&self.state.positions);
@@ -174,6 +216,7 @@ impl Run {
         if all_out {
             overlaps.clear();
         }
+        self.close = if self.frames_over < SEPARATION_FRAMES { close } else { Vec::new() };
         self.metrics.set(PINNED, influences.pinned as f64);
         influences.goals.measure(interval.frames[1], cx.get(GOAL_ON), &self.state.positions, &mut self.metrics);
         (self.goals, self.overlaps, self.solving) = (goals, overlaps, Some(solving));
@@ -287,7 +330,7 @@ impl Run {
             self.metrics.set(NOT_PUSHED_OUT, found.inside as f64);
         }
         let all_out = !started || (is_over && found.inside == 0);
-        let through = if all_out { (found.deepest - thickness).max(0.0) } else { 0.0 };
+        let through = if all_out { (found.deepest - thickness - scene.yields()).max(0.0) } else { 0.0 };
         self.metrics.set(DEEPEST_OVERLAP, found.deepest);
         self.metrics.set(POINTS_INSIDE, found.inside as f64);
         self.metrics.set(DEEPEST_PENETRATION, through);

@@ -121,6 +121,7 @@ impl SimulationSetup {
         let mut fill = Vec::new();
         let (mut wires, mut triangles, mut carriers) = (Vec::new(), Vec::new(), Vec::new());
         let (mut outer, mut riding, mut riding_triangles) = (Vec::new(), Vec::new(), Vec::new());
+        let mut rows = Vec::new();
         for (wire, geometry) in inputs.bodies.iter().enumerate() {
             let own = geometry.require(Kind::Tets)?;
             let first = rest.len() as u32;
@@ -137,6 +138,9 @@ impl SimulationSetup {
             }
             missing.extend(found.missing.iter().map(|edge| edge.map(|end| end + first)));
             triangles.extend(found.triangles.iter().map(|corners| corners.map(|corner| corner + first)));
+            rows.resize(rest.len(), -1);
+            let points = (carriers.len() as i32..).zip(&found.carriers).filter(|_| !found.rides);
+            points.for_each(|(row, carrier)| rows[first as usize + carrier.particles[0] as usize] = row);
             let carried = found.carriers.iter().map(|carrier| EmbeddedPoint {
                 particles: carrier.particles.map(|particle| particle + first),
                 ..*carrier
@@ -155,6 +159,9 @@ impl SimulationSetup {
         }
         if let Some(body) = body.as_mut().filter(|_| cx.wants(BODY_NUMBER)) {
             body.set(BODY_NUMBER, body_numbers(inputs)?)?;
+        }
+        if let Some(body) = body.as_mut().filter(|body| cx.wants(SURFACE_POINT) && body.get(SURFACE_POINT).is_some()) {
+            body.set(SURFACE_POINT, rows)?;
         }
         triangles.iter().flatten().for_each(|corner: &u32| outer[*corner as usize] = true);
         let links = all.iter().flat_map(|[first, others @ ..]: &[u32; 4]| others.map(|other| [*first, other]));

@@ -3,6 +3,8 @@ use conformance::{Bench, BenchResult, bench, conformance, cook_all};
 use engine::cook::{Engine, Settings};
 
 mod bounce;
+mod carried;
+mod close;
 mod goals;
 mod inside;
 mod riding;

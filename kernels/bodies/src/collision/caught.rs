@@ -33,9 +33,9 @@ impl CollisionScene<'_> {
         let boxes = swept::swept_boxes(&[from, to]);
         let (mut caught, released) = (Vec::new(), ReleasedElements::default());
         for obstacle in (0..self.obstacles.len()).filter(|index| self.obstacles[*index].is_closed()) {
-            for skin in self.skins {
+            for (index, skin) in self.skins.iter().enumerate() {
                 let mut own = Vec::new();
-                self.against_obstacle(&query, (skin, &released), &boxes, obstacle, &mut |meeting, tree| {
+                self.against_obstacle(&query, (index, &released), &boxes, obstacle, &mut |meeting, tree| {
                     let (mut faces, mut path) = (Vec::new(), Vec::new());
                     for particle in &skin.touching {
                         super::path_of(meeting.body.poses, *particle, &mut path);

@@ -15,11 +15,13 @@
 
 mod body_skin;
 mod caught;
+mod closeness;
 mod edge;
 mod motion;
 mod obstacle;
 mod overlap;
 mod pair;
+mod piercing;
 mod surface;
 mod vertex;
 
@@ -27,6 +29,8 @@ use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
 pub use body_skin::BodySkin;
 use body_skin::{ReleasedElements, has};
 pub use caught::CaughtParticle;
+pub use closeness::Closeness;
+use closeness::Yielding;
 pub use motion::ObstaclePose;
 use numerics::closest_point::ClosestPoint;
 use numerics::parallel;
@@ -149,7 +153,7 @@ impl ContactFinder for CollisionScene<'_> {
                         Some(pushed) => skin.releasing_particles(pushed),
                         None => skin.releasing(&released, self.caught_by(obstacle)),
                     };
-                    self.against_obstacle(query, (skin, &released), &boxes, obstacle, &mut |meeting, tree| {
+                    self.against_obstacle(query, (index, &released), &boxes, obstacle, &mut |meeting, tree| {
                         meeting.particles(tree, out);
                         if pushed.is_none() {
                             meeting.points(&faces, out);
@@ -169,6 +173,7 @@ impl CollisionScene<'_> {
         let up = DVec3::from(ground.up);
         for (index, skin) in self.skins.iter().enumerate() {
             let rising = self.separating(index, OverlapPartner::Ground);
+            let yielding = self.yielding(index, Some(OverlapPartner::Ground), query.times);
             for particle in &skin.touching {
                 let height = |x: &[[f64; 3]]| up.dot(&DVec3::from(x[*particle as usize])) - ground.height;
                 let before = height(query.from);
@@ -177,7 +182,7 @@ impl CollisionScene<'_> {
                 }
                 let depth = (ground.thickness - before).max(0.0);
                 let (allowed, speed) = rising.map_or((0.0, 0.0), |overlap| self.allowed(overlap, depth, query.times));
-                out.push(Contact {
+                out.push(yielding.of(Contact {
                     points: [*particle, 0, 0, 0],
                     weights: [1.0, 0.0, 0.0, 0.0],
                     normal: ground.up,
@@ -186,7 +191,8 @@ impl CollisionScene<'_> {
                     velocity: (up * speed).into(),
                     friction: ground.friction * self.friction_scale(&[*particle], &[1.0]),
                     jammed: false,
-                });
+                    open: false,
+                }));
             }
         }
     }
@@ -203,17 +209,17 @@ impl CollisionScene<'_> {
         if whole > 0.0 { sum / whole } else { 1.0 }
     }
 
-    /// Calls `act` with a skin, without its released elements, and an obstacle, unless they stay apart, and with the
+    /// Calls `act` with a skin, by index, without its released elements, and an obstacle, unless they stay apart, and with the
     /// swept boxes of the obstacle's triangles. `boxes` are those of the particles.
     fn against_obstacle(
         &self,
         query: &ContactQuery<'_>,
-        (skin, released): (&BodySkin, &ReleasedElements),
+        (skin_index, released): (usize, &ReleasedElements),
         boxes: &[Cuboid],
         index: usize,
         act: &mut dyn FnMut(&SkinObstaclePair<'_>, &SweptBoxTree<'_>),
     ) {
-        let obstacle = &self.obstacles[index];
+        let (skin, obstacle) = (&self.skins[skin_index], &self.obstacles[index]);
         let rules = ContactRules { gap: obstacle.thickness, reach: REACH * obstacle.thickness, push: true };
         let times = obstacle.motion.times(query.times, SAG * obstacle.thickness);
         let obstacle_poses: Vec<Vec<[f64; 3]>> = times.iter().map(|time| obstacle.at(*time)).collect();
@@ -239,6 +245,7 @@ impl CollisionScene<'_> {
             body: MovingSurface { surface: &skin.surface, poses: &body_poses },
             still: MovingSurface { surface: &obstacle.surface, poses: &obstacle_poses },
             rules,
+            yielding: self.yielding(skin_index, Some(OverlapPartner::Obstacle(index)), query.times),
         };
         act(&meeting, &tree);
     }
@@ -269,6 +276,7 @@ struct SkinObstaclePair<'a> {
     body: MovingSurface<'a>,
     still: MovingSurface<'a>,
     rules: ContactRules,
+    yielding: Yielding,
 }
 
 /// Adds the contacts of some things to a list, with buffers that another task may have used before.
@@ -403,7 +411,7 @@ impl SkinObstaclePair<'_> {
         let [raised, raised_end] = touched.map(|touched| self.scene.raised(touched, normal, gap));
         let seconds = self.obstacle.seconds * (times[1] - times[0]);
         let stopping = if seconds > 0.0 { (raised_end - raised) / seconds } else { DVec3::zeros() };
-        Contact {
+        let contact = Contact {
             points: own,
             weights,
             normal: normal.into(),
@@ -412,7 +420,9 @@ impl SkinObstaclePair<'_> {
             velocity: (self.obstacle.velocity_of(times[1], points, shares) + stopping).into(),
             friction: self.obstacle.friction * self.scene.friction_scale(&own, &weights),
             jammed: -normal.dot(&raised_end) > JAMMED * gap,
-        }
+            open: !self.obstacle.surface.closed,
+        };
+        if self.obstacle.surface.closed { self.yielding.of(contact) } else { self.yielding.of_open(contact) }
     }
 }
 

@@ -13,7 +13,7 @@
 
 use super::obstacle::narrow;
 use super::surface::{Moment, TriangleSurface};
-use super::{BodySkin, CollisionScene, Obstacle};
+use super::{BodySkin, Closeness, CollisionScene, Obstacle};
 use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
 use crate::tets::{Enclosure, Exit, bounds};
 use numerics::closest_point::ClosestPoint;
@@ -54,11 +54,15 @@ pub struct Overlap {
     pub depth: f64,
 }
 
-/// How overlapping bodies are pushed apart in a frame.
-#[derive(Clone, Copy, Debug)]
+/// How bodies that overlap or are too close are pushed apart in a frame.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Separation<'a> {
     /// The overlaps at the start.
     pub overlaps: &'a [Overlap],
+    /// What is too close at the start.
+    pub close: &'a [Closeness],
+    /// By how much all contacts yield at the start and the end of the frame because the distance to keep grew, metres.
+    pub grown: [f64; 2],
     /// Number of frames in which they are to come apart.
     pub frames: u32,
     /// Number of those that are over.
@@ -277,7 +281,7 @@ impl CollisionScene<'_> {
     ) -> Contact {
         let (allowed, speed) = self.allowed(overlap, exit.distance + gap, query.times);
         let (velocity, normal) = ((normal * speed).into(), normal.into());
-        Contact { points, weights, normal, offset: -allowed, gap, velocity, friction: 0.0, jammed: false }
+        Contact { points, weights, normal, offset: -allowed, gap, velocity, friction: 0.0, jammed: false, open: false }
     }
 
     fn out_of_skin(&self, query: &ContactQuery<'_>, overlap: &Overlap, other: &BodySkin, out: &mut Vec<Contact>) {
@@ -369,6 +373,12 @@ impl CollisionScene<'_> {
                 inside[*point as usize] |= distance > TOUCHING * gap;
                 found.deepest = found.deepest.max(gap + distance);
             }
+        }
+        let pierced = self.deepest_piercing(x);
+        let gaps = self.obstacles.iter().map(|obstacle| obstacle.thickness);
+        let gap = gaps.chain(self.body_contact.map(|contact| contact.thickness)).fold(0.0, f64::max);
+        if pierced > TOUCHING * gap {
+            found.deepest = found.deepest.max(gap + pierced);
         }
         found.inside = inside.iter().filter(|inside| **inside).count();
         found

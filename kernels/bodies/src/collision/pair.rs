@@ -3,7 +3,7 @@
 use super::body_skin::BodySkin;
 use super::edge;
 use super::vertex::{self, ContactRules, MovingSurface};
-use super::{CollisionScene, OverlapPartner, REACH, collect_in_order};
+use super::{CollisionScene, OverlapPartner, REACH, Yielding, collect_in_order};
 use crate::mass_spring::{Contact, ContactQuery};
 use numerics::swept::{self, SweptBoxTree};
 use numerics::tree::Cuboid;
@@ -32,6 +32,7 @@ struct Pair<'a> {
     self_contact: bool,
     params: ContactParams,
     rules: ContactRules,
+    yielding: Yielding,
 }
 
 /// Marks the neighbourhood of some points, by the number of the query that marked them last.
@@ -88,6 +89,11 @@ impl CollisionScene<'_> {
             self_contact,
             params,
             rules: ContactRules { gap: params.thickness, reach: REACH * params.thickness, push: !self_contact },
+            yielding: self.yielding(
+                skins[0].min(skins[1]),
+                (!self_contact).then(|| OverlapPartner::Skin(skins[0].max(skins[1]))),
+                query.times,
+            ),
         };
         if let Some(params) = self.body_contact.filter(|_| self.skins.len() > 1) {
             let boxes = boxes(REACH * params.thickness);
@@ -182,7 +188,7 @@ impl Pair<'_> {
         if gap < JOINED * self.params.thickness {
             return None;
         }
-        Some(Contact {
+        Some(self.yielding.of(Contact {
             points,
             weights,
             normal: normal.into(),
@@ -191,6 +197,7 @@ impl Pair<'_> {
             velocity: [0.0; 3],
             friction: self.params.friction * self.scene.friction_scale(&points, &weights),
             jammed: false,
-        })
+            open: false,
+        }))
     }
 }

@@ -59,6 +59,8 @@ pub struct Contact {
     pub friction: f64,
     /// Whether the obstacle leaves no room between it and the ground, so that nothing can meet both.
     pub jammed: bool,
+    /// Whether the obstacle has no inside, so that positions do not tell the side of what went through it.
+    pub open: bool,
 }
 
 impl Contact {
@@ -105,10 +107,11 @@ pub(super) struct ContactConstraint {
     counts: [usize; 2],
     pub(super) normal: DVec3,
     offset: f64,
-    gap: f64,
+    pub(super) gap: f64,
     pub(super) velocity: DVec3,
     pub(super) friction: f64,
     jammed: bool,
+    pub(super) open: bool,
     /// Penalty stiffness κ, N/m.
     penalty_stiffness: f64,
     /// Largest resistance of friction to a slip rate, N·s/m.
@@ -177,6 +180,7 @@ impl ContactConstraint {
             velocity: DVec3::from(contact.velocity),
             friction: contact.friction.max(0.0),
             jammed: contact.jammed,
+            open: contact.open,
             ..Self::default()
         };
         for k in 0..4 {

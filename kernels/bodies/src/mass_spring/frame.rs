@@ -244,7 +244,7 @@ impl Stepper<'_> {
         /// tolerance.
         const MOST_NEWTON: [u32; 2] = [400, 4000];
         let turned = self.solver.inventory.inverted > 0;
-        let (end, stepped) = self.step(motion, times);
+        let (mut end, mut stepped) = self.step(motion, times);
         self.report.newton += stepped.solved.newton;
         self.report.cg += stepped.solved.cg;
         let (share, unmet) = (times[1] - times[0], stepped.solved.unmet);
@@ -262,6 +262,9 @@ impl Stepper<'_> {
         if self.frame.substeps > 0 || (self.frame.cancelled)() || is_over || parts < 2 {
             self.report.uncut_impacts += u32::from(wanted > 1 && !shortest);
             self.report.tolerance_missed += u32::from(stepped.estimate > allowed);
+            if unmet > 0.0 {
+                self.keep_sides(motion, times, &mut end, &mut stepped);
+            }
             *motion = end;
             return self.accept(&stepped);
         }

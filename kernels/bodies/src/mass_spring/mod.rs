@@ -34,6 +34,7 @@ mod plastic;
 mod predictor;
 mod regions;
 mod search;
+mod sides;
 mod springs;
 mod stage;
 mod state;

@@ -257,7 +257,7 @@ impl Stepper<'_> {
 }
 
 /// Kinetic energy, joules.
-fn kinetic(body: &SoftBody, v: &[DVec3]) -> f64 {
+pub(super) fn kinetic(body: &SoftBody, v: &[DVec3]) -> f64 {
     v.iter().zip(&body.mass).map(|(v, mass)| 0.5 * mass * v.norm_squared()).sum()
 }
 

@@ -1,5 +1,6 @@
 //! What starts inside something: counted, said, and pushed out.
 
+use super::close::{lowest, sheet};
 use super::*;
 use numerics::vector::length;
 
@@ -156,5 +157,17 @@ fn a_collider_that_starts_in_a_body_may_go_on_pressing() {
         assert!(metrics["deepest_overlap"] < 2.4e-3 && metrics["caps_hit"] == 0.0, "{over}: {metrics:?}");
         assert!(over < 12 || metrics["points_inside"] == 0.0, "{over}: {metrics:?}");
         assert!(metrics["newton"] < 30.0 && metrics["inverted_tets"] == 0.0, "{over}: {metrics:?}");
+    }
+}
+
+/// Default settings, cubes that fall 1.5 m onto a sheet of one face: no point of them is ever below it.
+#[test]
+fn a_body_that_falls_on_an_open_collider_stays_above_it() {
+    for (count, thickness) in [(2, 1e-3), (3, 1e-3), (3, 1e-5)] {
+        let cube = block([count; 3], [0.0, 1.5, 0.0], [0.2; 3]);
+        let frames = simulating(cube).input(COLLIDERS, sheet()).set(THICKNESS, thickness).frames(1..=24);
+        for (over, frame) in frames.iter().enumerate() {
+            assert!(lowest(frame) > -1e-7, "{count} {thickness} {over}: {} {:?}", lowest(frame), frame.metrics);
+        }
     }
 }

@@ -27,6 +27,7 @@ impl ContactFinder for Planes {
                         velocity: (n * ((heights[1] - heights[0]) / self.1)).into(),
                         friction: *friction,
                         jammed: false,
+                        open: false,
                     });
                 }
             }
@@ -73,6 +74,7 @@ impl ContactFinder for RollingPin {
                     velocity: (pace + DVec3::z().cross(&n) * (self.angular_velocity * self.radius)).into(),
                     friction: self.friction,
                     jammed: false,
+                    open: false,
                 });
             }
         }
@@ -311,6 +313,7 @@ impl ContactFinder for Stack {
                     velocity: [0.0; 3],
                     friction: 0.5,
                     jammed: false,
+                    open: false,
                 });
             }
         }

@@ -86,6 +86,7 @@ fn a_contact_of_a_riding_point_is_that_of_its_particles_each_once() {
                 velocity,
                 friction: 0.0,
                 jammed: false,
+                open: false,
             };
             out.push(contact);
         }

@@ -1,0 +1,136 @@
+//! What is closer than it should keep, but not inside: at the start, and when the distance to keep grows.
+//!
+//! Contacts resist as springs that hold the whole missing distance would throw bodies apart. They therefore yield by that
+//! distance at first, and by less and less of it until it is there, at the same speed for all points of a pair. At an open
+//! obstacle, which is entered from either side, contacts keep a smaller distance instead, so that nothing goes through.
+
+use super::{CollisionScene, Overlap, OverlapPartner, Separation};
+use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
+use numerics::vector::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// Missing distance, in gaps, below which bodies count as touching.
+const TOUCHING: f64 = 1e-3;
+/// Largest missing distance, in gaps: what is deeper is inside.
+const MOST: f64 = 2.0;
+/// Smallest distance that contacts with open obstacles keep, in gaps: what they push off something that lies on the surface
+/// then is as little as what moves it off.
+const LEAST: f64 = 0.005;
+
+/// A body and what it is too close to.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Closeness {
+    /// Index of the body's skin; with another skin the lower one.
+    pub skin: usize,
+    /// What it is close to.
+    pub partner: OverlapPartner,
+    /// The distance to keep − the smallest distance, metres.
+    pub missing: f64,
+}
+
+/// By how much contacts yield at the end of a query, metres, and how fast that falls, m/s.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Yielding {
+    by: f64,
+    speed: f64,
+}
+
+impl Yielding {
+    /// A contact that lets surfaces be closer by that, unless there is no room for it.
+    pub(super) fn of(self, contact: Contact) -> Contact {
+        if contact.jammed || (self.by == 0.0 && self.speed == 0.0) {
+            return contact;
+        }
+        Contact { offset: contact.offset - self.by, velocity: self.receding(&contact), ..contact }
+    }
+
+    /// The same with an obstacle that must not be passed: its distance is smaller.
+    pub(super) fn of_open(self, contact: Contact) -> Contact {
+        if contact.jammed || (self.by == 0.0 && self.speed == 0.0) {
+            return contact;
+        }
+        let gap = (contact.gap - self.by).max(LEAST * contact.gap);
+        Contact { gap, velocity: self.receding(&contact), ..contact }
+    }
+
+    fn receding(self, contact: &Contact) -> [f64; 3] {
+        (DVec3::from(contact.velocity) + DVec3::from(contact.normal) * self.speed).into()
+    }
+}
+
+impl Separation<'_> {
+    /// By how much contacts of a pair with this distance `missing` at the start yield.
+    fn yielding(&self, missing: f64, times: [f64; 2]) -> Yielding {
+        let left = |time: f64| {
+            let over = (f64::from(self.over) + time) / f64::from(self.frames);
+            let [start, end] = self.grown;
+            missing * (1.0 - over).max(0.0) + start + (end - start) * time
+        };
+        let [start, end] = times.map(left);
+        let seconds = self.seconds * (times[1] - times[0]);
+        Yielding { by: end, speed: if seconds > 0.0 { (start - end) / seconds } else { 0.0 } }
+    }
+}
+
+impl CollisionScene<'_> {
+    /// By how much contacts of a skin with a partner yield; `None`: with itself.
+    pub(super) fn yielding(&self, skin: usize, partner: Option<OverlapPartner>, times: [f64; 2]) -> Yielding {
+        let Some(separation) = self.separation else { return Yielding::default() };
+        let known = partner
+            .and_then(|partner| separation.close.iter().find(|close| close.skin == skin && close.partner == partner));
+        separation.yielding(known.map_or(0.0, |close| close.missing), times)
+    }
+
+    /// The largest distance by which contacts yield at the end of the frame, metres.
+    pub fn yields(&self) -> f64 {
+        let Some(separation) = self.separation else { return 0.0 };
+        let missing = separation.close.iter().map(|close| close.missing).fold(0.0, f64::max);
+        separation.yielding(missing, [1.0; 2]).by
+    }
+
+    /// The pairs that are too close at the start of the frame, with contact points at `x`, apart from those of `overlaps`.
+    pub fn too_close(&self, x: &[[f64; 3]], overlaps: &[Overlap]) -> Vec<Closeness> {
+        let mut skin_of = vec![usize::MAX; x.len()];
+        for (index, skin) in self.skins.iter().enumerate() {
+            skin.touching.iter().for_each(|point| skin_of[*point as usize] = index);
+        }
+        let bare = CollisionScene { ground: None, obstacles: &[], body_contact: None, self_contact: None, ..*self };
+        let bare = CollisionScene { separation: None, caught: &[], ..bare };
+        let mut found: Vec<Closeness> = Vec::new();
+        let mut add = |scene: CollisionScene<'_>, of: Option<OverlapPartner>| {
+            let mut contacts = Vec::new();
+            scene.find(&ContactQuery { from: x, to: x, times: [0.0; 2] }, &mut contacts);
+            for contact in &contacts {
+                let side = |positive: bool| {
+                    let mut sides = contact.points.iter().zip(contact.weights);
+                    sides.find(|(_, weight)| *weight != 0.0 && (*weight > 0.0) == positive).map(|side| *side.0)
+                };
+                let of_point = |point: Option<u32>| point.map_or(usize::MAX, |point| skin_of[point as usize]);
+                let [first, second] = [of_point(side(true)), of_point(side(false))];
+                let (skin, partner) = match of {
+                    Some(partner) => (first, partner),
+                    None => (first.min(second), OverlapPartner::Skin(first.max(second))),
+                };
+                let missing = contact.depth(x);
+                if !missing.is_finite()
+                    || missing <= TOUCHING * contact.gap
+                    || overlaps.iter().any(|overlap| (overlap.skin, overlap.partner) == (skin, partner))
+                {
+                    continue;
+                }
+                let missing = missing.min(MOST * contact.gap);
+                match found.iter_mut().find(|close| (close.skin, close.partner) == (skin, partner)) {
+                    Some(close) => close.missing = close.missing.max(missing),
+                    None => found.push(Closeness { skin, partner, missing }),
+                }
+            }
+        };
+        add(CollisionScene { ground: self.ground, ..bare }, Some(OverlapPartner::Ground));
+        for (index, obstacle) in self.obstacles.iter().enumerate() {
+            let obstacles = std::slice::from_ref(obstacle);
+            add(CollisionScene { obstacles, ..bare }, Some(OverlapPartner::Obstacle(index)));
+        }
+        add(CollisionScene { body_contact: self.body_contact, ..bare }, None);
+        found
+    }
+}

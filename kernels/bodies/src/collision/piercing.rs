@@ -1,0 +1,140 @@
+//! Edges of one surface that go through another, which no point shows: a thin rod through the face of a coarse mesh, say.
+//!
+//! Limit: bodies are not tested against themselves.
+
+use super::obstacle::narrow;
+use super::surface::{Edge, Moment, TriangleSurface};
+use super::{CollisionScene, TASK};
+use numerics::parallel;
+use numerics::swept::{self, SweptBoxTree, SweptElements};
+use numerics::tree::{Cuboid, TriangleTree};
+use numerics::vector::DVec3;
+
+/// A surface at one time.
+#[derive(Clone, Copy)]
+struct Still<'a> {
+    surface: &'a TriangleSurface,
+    points: &'a [[f64; 3]],
+    boxes: &'a [Cuboid],
+    faces: &'a SweptElements<3>,
+}
+
+/// How far edges are in a surface.
+#[derive(Default)]
+struct Pierced {
+    /// Middles of the stretches of edges within a closed one.
+    within: Vec<DVec3>,
+    /// For open ones the largest distance to which both ends of an edge are on either side, metres.
+    deepest: f64,
+}
+
+impl CollisionScene<'_> {
+    /// The largest distance below a surface that an edge of another one reaches, with contact points at `x` and obstacles
+    /// at the end of the frame, metres; 0 if none goes through another.
+    pub(super) fn deepest_piercing(&self, x: &[[f64; 3]]) -> f64 {
+        let boxes = swept::swept_boxes(&[x]);
+        let skins: Vec<Still<'_>> = self
+            .skins
+            .iter()
+            .map(|skin| Still { surface: &skin.surface, points: x, boxes: &boxes, faces: &skin.faces })
+            .collect();
+        let mut deepest = 0.0_f64;
+        for obstacle in self.obstacles {
+            let points = obstacle.at(1.0);
+            let boxes = swept::swept_boxes(&[&points]);
+            let still = Still { surface: &obstacle.surface, points: &points, boxes: &boxes, faces: &obstacle.faces };
+            for (own, skin) in skins.iter().zip(self.skins) {
+                let [of_skin, of_obstacle] = [own, &still].map(Still::bounds);
+                if swept::overlap(&of_skin, &of_obstacle) {
+                    let released = skin.released(x);
+                    let edges = skin.surface.edges.iter().zip(0..).filter(|(_, at)| !super::has(&released.edges, *at));
+                    let edges: Vec<&Edge> = edges.map(|(edge, _)| edge).collect();
+                    let sharp: Vec<&Edge> =
+                        obstacle.sharp_edges.iter().map(|edge| &obstacle.surface.edges[*edge as usize]).collect();
+                    deepest = deepest.max(own.reaches(&edges, &still));
+                    if released.faces.is_empty() {
+                        deepest = deepest.max(still.reaches(&sharp, own));
+                    }
+                }
+            }
+        }
+        if self.body_contact.is_some() {
+            for (second, other) in skins.iter().enumerate() {
+                for own in &skins[..second] {
+                    if swept::overlap(&own.bounds(), &other.bounds()) {
+                        let [edges, others] = [own, other].map(|skin| skin.surface.edges.iter().collect::<Vec<_>>());
+                        deepest = deepest.max(own.reaches(&edges, other)).max(other.reaches(&others, own));
+                    }
+                }
+            }
+        }
+        deepest
+    }
+}
+
+impl Still<'_> {
+    fn bounds(&self) -> Cuboid {
+        swept::bounds_of_finite(&self.surface.vertices, self.boxes)
+    }
+
+    /// The largest distance below the surface of `other` that some of its edges reach.
+    fn reaches(&self, edges: &[&Edge], other: &Still<'_>) -> f64 {
+        let tree = other.faces.sweep(other.boxes, 0.0);
+        let parts = parallel::map(edges.chunks(TASK), |_, edges| {
+            let (mut pierced, mut faces) = (Pierced::default(), Vec::new());
+            edges.iter().for_each(|edge| self.pierce(edge, (other, &tree), &mut faces, &mut pierced));
+            pierced
+        });
+        let deepest = parts.iter().map(|part| part.deepest).fold(0.0, f64::max);
+        let within: Vec<[f64; 3]> = parts.iter().flat_map(|part| &part.within).map(|point| (*point).into()).collect();
+        if within.is_empty() {
+            return deepest;
+        }
+        let solid = TriangleTree::build(&narrow(other.points), &other.surface.triangles);
+        let closest = solid.closest_each(&narrow(&within), f32::INFINITY).into_iter().flatten();
+        closest.map(|closest| f64::from(closest.distance)).fold(deepest, f64::max)
+    }
+
+    fn pierce(
+        &self,
+        edge: &Edge,
+        (other, tree): (&Still<'_>, &SweptBoxTree<'_>),
+        faces: &mut Vec<u32>,
+        pierced: &mut Pierced,
+    ) {
+        tree.overlapping(&swept::bounds_of(&edge.ends, self.boxes), faces);
+        let [p, q] = edge.ends.map(|end| DVec3::from(self.points[end as usize]));
+        let at = Moment::of(other.points);
+        // Where it goes in, and where it comes out.
+        let mut crossed: Vec<(f64, bool)> = Vec::new();
+        for face in faces.iter() {
+            let corners = other.surface.corners(&at, *face);
+            let Some((share, sides)) = crossing([p, q], corners) else { continue };
+            crossed.push((share, sides[0] > 0.0));
+            if !other.surface.closed {
+                pierced.deepest = pierced.deepest.max(sides[0].abs().min(sides[1].abs()));
+            }
+        }
+        if crossed.is_empty() || !other.surface.closed {
+            return;
+        }
+        crossed.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let ends = [(0.0, !crossed[0].1), (1.0, false)];
+        let all: Vec<(f64, bool)> = [ends[0]].into_iter().chain(crossed).chain([ends[1]]).collect();
+        let stretches = all.windows(2).filter(|pair| pair[0].1);
+        pierced.within.extend(stretches.map(|pair| p.lerp(&q, 0.5 * (pair[0].0 + pair[1].0))));
+    }
+}
+
+/// Where a segment goes through a triangle, as a fraction of it, and the distances of its ends from the triangle's plane.
+fn crossing([p, q]: [DVec3; 2], [a, b, c]: [DVec3; 3]) -> Option<(f64, [f64; 2])> {
+    let normal = (b - a).cross(&(c - a)).try_normalize(0.0)?;
+    let sides = [p, q].map(|end| normal.dot(&(end - a)));
+    if (sides[0] < 0.0) == (sides[1] < 0.0) || sides.contains(&0.0) {
+        return None;
+    }
+    let way = q - p;
+    let turns = [[a, b], [b, c], [c, a]].map(|[from, to]| way.dot(&(from - p).cross(&(to - p))));
+    let inside = turns.iter().all(|turn| *turn >= 0.0) || turns.iter().all(|turn| *turn <= 0.0);
+    inside.then_some((sides[0] / (sides[0] - sides[1]), sides))
+}
