@@ -287,7 +287,10 @@ impl Subject {
                     .extend(errors.map(|(place, error, _)| (*place, error.error.kind, error.error.to_string())));
                 let metrics = self.node.metrics.iter().map(|metric| metric.name);
                 let says_so = |name: &str| {
-                    report.notes.iter().any(|note| note.kind == name && note.text.contains(&format!("has no `{name}`")))
+                    report
+                        .notes
+                        .iter()
+                        .any(|note| note.kind == name && note.text.contains(&format!("reports no `{name}`")))
                 };
                 outcome.undefined_metrics = metrics.filter(|name| says_so(name)).collect();
                 outcome.read = read;

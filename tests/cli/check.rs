@@ -83,21 +83,24 @@ fn attributes_that_no_input_can_have_are_faults() {
 
 #[test]
 fn lists_whose_length_changes_are_faults() {
-    let offsets = |first: usize, last: usize| {
+    let offsets = |first: usize, last: usize, interpolation: &str| {
         let vectors = |count: usize| format!("[{}]", vec!["[0, 0.1, 0]"; count].join(", "));
         let keys = format!("[[1, {}], [5, {}]]", vectors(first), vectors(last));
         let graph = format!(
             r#"{{"convect": 1, "scene": {{"frames": [1, 9]}}, "nodes": {{"box": {{"type": "Mesh_Primitive"}},
             "a": {{"type": "Lattice_Deform", "inputs": {{"geometry": "box"}},
-                "params": {{"offsets": {{"keyframes": {keys}}}}}}}}}, "outputs": {{"o": "a"}}}}"#
+                "params": {{"offsets": {{"keyframes": {keys}, "interpolation": "{interpolation}"}}}}}}}}, "outputs": {{"o": "a"}}}}"#
         );
         check(&Bench::with_graph(&graph))
     };
-    assert_eq!(offsets(8, 8).code, Some(0));
-    let ran = offsets(8, 7);
+    assert_eq!(offsets(8, 8, "linear").code, Some(0));
+    let ran = offsets(8, 7, "linear");
+    assert_eq!(ran.code, Some(3), "{}", ran.stderr);
+    assert!(ran.stderr.contains("the list has length 7, that of the key at frame 1 length 8"), "{}", ran.stderr);
+    let ran = offsets(8, 7, "constant");
     assert_eq!(ran.code, Some(3), "{}", ran.stderr);
     assert!(ran.stderr.contains("nodes.a.params.offsets: `offsets` has 7 vectors"), "{}", ran.stderr);
-    let always = offsets(1, 7);
+    let always = offsets(1, 7, "constant");
     assert_eq!(always.stderr.lines().count(), 1, "one fault, over time and at the start: {}", always.stderr);
 }
 

@@ -52,25 +52,25 @@ pub(super) fn extremely_thin_liquid_is_carried_or_told() {
             r#""shape": { "type": "Mesh_Primitive", "params": { "size": [0.6, 0.04, 0.6], "divisions": 1 } },
                "placed": { "type": "Transform", "inputs": { "geometry": "shape" }, "params": { "translate": [0.5, 0.5, 0.5] } }"#,
         )
-        .refused("is thinner than the surface's cells"),
+        .refused("is thinner everywhere than the surface's cells"),
         sized(
             "a sheet of a hundredth of a cell",
             r#""shape": { "type": "Mesh_Primitive", "params": { "size": [0.6, 0.0008, 0.6], "divisions": 1 } },
                "placed": { "type": "Transform", "inputs": { "geometry": "shape" }, "params": { "translate": [0.5, 0.5, 0.5] } }"#,
         )
-        .refused("is thinner than the surface's cells"),
+        .refused("is thinner everywhere than the surface's cells"),
         sized(
             "a sheet upright, of half a cell",
             r#""shape": { "type": "Mesh_Primitive", "params": { "size": [0.6, 0.6, 0.04], "divisions": 1 } },
                "placed": { "type": "Transform", "inputs": { "geometry": "shape" }, "params": { "translate": [0.5, 0.5, 0.5] } }"#,
         )
-        .refused("is thinner than the surface's cells"),
+        .refused("is thinner everywhere than the surface's cells"),
         sized(
             "a drop of half a cell",
             r#""shape": { "type": "Mesh_Primitive", "params": { "shape": "sphere", "size": [0.04, 0.04, 0.04], "divisions": 4 } },
                "placed": { "type": "Transform", "inputs": { "geometry": "shape" }, "params": { "translate": [0.5, 0.5, 0.5] } }"#,
         )
-        .refused("is thinner than the surface's cells"),
+        .refused("is thinner everywhere than the surface's cells"),
         sized(
             "a mesh without volume",
             r#""shape": { "type": "Mesh_Primitive", "params": { "size": [0.5, 0, 0.5], "divisions": 1 } },
