@@ -159,15 +159,15 @@ impl Sector {
             (all.with(&piece.turned(turns)), wide.with(&around.turned(turns)))
         });
         if all.hi - all.lo > std::f64::consts::PI {
-            pieces().for_each(|[_, around]| found(around.from_start()));
+            pieces().for_each(|[_, around]| found(around.wrapped()));
         } else if all.lo < 0.0 && all.hi >= 0.0 {
             // It touches the thick segment at the start: its intersection with the middle plane decides which side it
             // is on.
             if let Some(piece) = slice(heights, 0.0, |k| flat[k]) {
-                self.within_reach(piece, |p, q| found(self.around(p, q).from_start()));
+                self.within_reach(piece, |p, q| found(self.around(p, q).wrapped()));
             }
         } else {
-            found(around.from_start());
+            found(around.wrapped());
         }
     }
 
@@ -221,7 +221,7 @@ impl Blocked {
     }
 
     /// The same interval with `lo` in −π…π.
-    fn from_start(&self) -> Self {
+    fn wrapped(&self) -> Self {
         let turns = match self.lo {
             lo if lo < -std::f64::consts::PI => std::f64::consts::TAU,
             lo if lo > std::f64::consts::PI => -std::f64::consts::TAU,
