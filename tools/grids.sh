@@ -42,7 +42,9 @@ text = json.dumps(head)[:-1] + ', "runs": [\n' + ",\n".join(line(run) for run in
 open(sys.argv[3], "w").write(text)
 PYTHON
 }
-grid dough_rolling dough --norm surface --knob body.spacing=0.04,0.0283,0.02,0.01414,0.01 --knob dough.substeps=1,2,4,8
+# The tets are as large as the faces of `lump`.
+grid dough_rolling dough --norm surface --knob block.divisions=3,4,6,8,12 --knob dough.substeps=1,2,4,8 \
+    --knob dough.tolerance=1e-2,1e-3,1e-4
 grid sauce_pour dish --norm surface --knob sauce.cell=0.036,0.02546,0.018,0.01273,0.009 --knob sauce.cfl=4,2,1,0.5 \
     --knob sauce.tolerance=1e-2,1e-3,1e-4
 grid bear_storm bear --set fur_out.coherence=0 --knob fur_out.rotation_steps=2,4,8,16,32,64 --knob swing.tolerance=1e-1,1e-2,1e-3,1e-4

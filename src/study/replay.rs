@@ -30,12 +30,11 @@ struct Replayed {
 
 /// A grid's name; the largest share of its time that a search may take, with each setting cooked once, without the reference,
 /// and as the commands cook them; and how many times as long as the cheapest setting within the tolerance the pick may take.
-/// The search was made on the first three; no number in it is from the others.
+/// The search was made on the first two, and on dough_rolling as it was before; no number in it is from these others.
 const GRIDS: [(&str, [f64; 3]); 7] = [
-    // The reference alone takes 27 % of what the full grid takes.
-    ("dough_rolling", [0.25, 0.36, 1.2]),
     ("sauce_pour", [0.25, 0.21, 1.2]),
     ("bear_storm", [0.25, 0.19, 1.2]),
+    ("dough_rolling", [0.25, 0.25, 1.3]),
     ("curve_wind_collision", [0.25, 0.25, 1.4]),
     // All settings take about the same time, so that a quarter of it is that of four or five.
     ("curve_jiggle", [0.3, 0.3, 1.6]),
@@ -45,7 +44,7 @@ const GRIDS: [(&str, [f64; 3]); 7] = [
     ("softbody_cage", [0.45, 0.45, 1.5]),
 ];
 
-/// The same of the first three with noisy times, at noise 0.
+/// The same of the first two with noisy times, at noise 0.
 const MOST_EXPENSIVE: f64 = 1.3;
 
 impl Grid {
@@ -221,9 +220,9 @@ fn with_noisy_times_the_pick_meets_the_tolerance_and_is_as_cheap() {
                 100.0 * noisy
             );
             // sauce_pour has settings that take the same time to a hundredth: another pick is one of these. The grids after the
-            // first three are printed for what they are: they were not made for the search, nor it for them.
+            // first two are printed for what they are: they were not made for the search, nor it for them.
             assert!(
-                same * 10 >= all * 7 && (place > 2 || worst <= MOST_EXPENSIVE * (1.0 + noisy / 2.0)),
+                same * 10 >= all * 7 && (place > 1 || worst <= MOST_EXPENSIVE * (1.0 + noisy / 2.0)),
                 "{}: {same} {worst}",
                 grid.name
             );
