@@ -250,8 +250,8 @@ metrics! { METRICS:
             `velocity`, `rate` and `active` have no effect. Use `initial_velocity`, or wire it to `sources`.");
     CLASHES = Metric::new("attribute_clashes", Unit::None,
         "Names of float attributes on `liquid`, `sources` and `tracers` that have another number of floats on some than on the first.")
-        .warn_above(0.0, "Of these attributes' names, the first mesh or points to have one says how many floats it has, first of `liquid`, then of \
-            `tracers` and of `sources`; what came by the same name with another number of floats was left out. Rename it there.");
+        .warn_above(0.0, "Inputs have attributes of the same name with different numbers of floats. Those of the first wire that has the \
+            name were kept, in the order `liquid`, `tracers`, `sources`, and the others were left out. Rename one of them.");
     POSITION_STEP = Metric::new("position_step", Unit::None,
         "Distance, in cells, between neighbouring positions in single precision where the surface is farthest from the origin.")
         .warn_above(0.03125, "The liquid is so far from the origin that positions, which have single precision, step by {position_step} \

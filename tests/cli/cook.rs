@@ -284,3 +284,24 @@ fn curves_on_a_moving_skin_have_velocities() {
     let v = bench.read_json("out/o.0002.json")["curves"]["point_attributes"]["v"][0].clone();
     assert!((v[0].as_f64().unwrap() - 10.0).abs() < 1e-4, "1 m per frame, 10 frames per second: {v}");
 }
+
+/// Points of a sequence are known at whole frames alone. y = f² ÷ 100: 2f ÷ 100 a frame, at 10 frames per second;
+/// (4 − 1) ÷ 100 and (16 − 9) ÷ 100 at the ends.
+#[test]
+fn what_comes_from_a_sequence_of_files_has_the_difference_over_whole_frames() {
+    let bench = Bench::with_graph(
+        r#"{"convect": 1, "scene": {"frames": [1, 4], "fps": 10}, "nodes": {
+        "in": {"type": "Mesh_In", "params": {"file": "m.####.obj"}},
+        "moved": {"type": "Transform", "inputs": {"geometry": "in"}, "params": {"translate": [1, 0, 0]}}
+        }, "outputs": {"o": {"from": "moved", "v": true}}}"#,
+    );
+    for frame in 1..=4 {
+        let y = f64::from(frame * frame) / 100.0;
+        bench.write(&format!("m.{frame:04}.obj"), &format!("v 0 {y} 0\nv 1 {y} 0\nv 0 {y} 1\nf 1 2 3\n"));
+    }
+    bench.done(&["cook", "g.json", "--format", "json"]);
+    for (frame, expected) in [(1, 0.3), (2, 0.4), (3, 0.6), (4, 0.7)] {
+        let v = bench.read_json(&format!("out/o.000{frame}.json"))["mesh"]["point_attributes"]["v"][0][1].clone();
+        assert!((v.as_f64().unwrap() - expected).abs() < 1e-5, "frame {frame}: {v}");
+    }
+}

@@ -12,8 +12,10 @@ pub(super) struct Around {
     pub(super) results: [Arc<Geometry>; 2],
     /// Seconds between them.
     pub(super) seconds: f64,
-    /// They come from a solver: a whole frame away, and what has velocities has the solver's.
+    /// They come from a solver: what has velocities has the solver's.
     pub(super) of_solver: bool,
+    /// They are whole frames away.
+    pub(super) whole_frames: bool,
 }
 
 /// What an output delivers of `geometry`.
@@ -48,7 +50,7 @@ fn wanted(output: &GraphOutput, name: &Name) -> bool {
 
 fn add_velocity(result: &mut Geometry, around: &Around) -> Result<()> {
     let [before, after] = &around.results;
-    let away = if around.of_solver { "a frame" } else { "half a frame" };
+    let away = if around.whole_frames { "a frame" } else { "half a frame" };
     let kinds: Vec<_> = result.parts().map(|part| part.kind()).collect();
     for kind in kinds {
         let Some(part) = result.part_mut(kind).filter(|part| !around.of_solver || part.get(V).is_none()) else {

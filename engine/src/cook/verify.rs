@@ -56,7 +56,7 @@ impl Engine {
                 _ => &plan.nodes[index].resolver,
             };
             let before = faults.len();
-            let reads_sequence = params.iter().any(|source| matches!(source, Source::File { numbered: true, .. }));
+            let reads_sequence = params.iter().any(Source::is_sequence);
             if resolver.is_animated() && (reads_sequence || needed_by.is_none()) {
                 let over_time = ParamFaults::over(resolver, declared.checks, &frames);
                 let missing = over_time.missing.map(|error| fault(graph, index, error));

@@ -80,6 +80,11 @@ impl Source {
         }
     }
 
+    /// Whether it is a sequence of numbered files.
+    pub(crate) fn is_sequence(&self) -> bool {
+        matches!(self, Self::File { numbered: true, .. })
+    }
+
     /// The attribute that masks it, if one does.
     pub fn mask(&self) -> Option<&Name> {
         match self {

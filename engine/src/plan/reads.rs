@@ -153,10 +153,10 @@ impl<'g> Plan<'g> {
         }
     }
 
-    /// Samples of an input within the step to `frame`, the frame before first. A solver and what depends on it are known
-    /// at whole frames only.
+    /// Samples of an input within the step to `frame`, the frame before first. What solvers and sequences of files give is
+    /// known at whole frames only.
     fn step_samples(&self, links: &[Link], steps: u8, frame: Frame) -> Vec<Frame> {
-        let whole = links.iter().any(|link| self.nodes[link.node].has_solver);
+        let whole = links.iter().any(|link| self.nodes[link.node].whole_frames);
         let steps = if whole { 1 } else { i64::from(steps) };
         let before = frame.plus(-1);
         (0..=steps).map(|k| before.plus_ticks(Frame::TICKS * k / steps)).collect()
@@ -185,8 +185,8 @@ impl<'g> Plan<'g> {
     }
 
     /// The results that a delivered frame of an output is made of. Velocities that the node does not write itself are
-    /// the difference over half a frame each way, or a whole one where it comes from a solver, which has no others;
-    /// one-sided at the scene's ends.
+    /// the difference over half a frame each way, or a whole one where it comes from a solver or a sequence of files, which
+    /// have no others; one-sided at the scene's ends.
     pub(crate) fn delivery(&self, output: usize, frame: Frame) -> DeliveryReads {
         let scene = &self.graph.scene;
         let from = self.graph.outputs[output].from;
@@ -197,14 +197,17 @@ impl<'g> Plan<'g> {
         DeliveryReads { now: self.read(from, frame), around }
     }
 
-    /// The frames whose difference is an output's velocity at `frame`; `None` where it has none, or the node's own.
+    /// The frames whose difference is an output's velocity at `frame`; `None` where it has none, or the node's own. A scene of
+    /// one frame need not have another file to read.
     fn velocity_frames(&self, output: usize, frame: Frame) -> Option<[Frame; 2]> {
         let scene = &self.graph.scene;
         let output = &self.graph.outputs[output];
         let node = output.from.node;
         let writes_v = |node: &Node| node.writes.iter().any(|attribute| attribute.spec().0 == V.name);
         let own = self.graph.nodes[node].node().is_some_and(writes_v);
-        let ticks = if self.nodes[node].has_solver { Frame::TICKS } else { HALF };
+        let planned = &self.nodes[node];
+        let whole = planned.has_solver || planned.whole_frames && scene.start() != scene.end();
+        let ticks = if whole { Frame::TICKS } else { HALF };
         (output.v && !own).then(|| {
             let before = if frame == scene.start() { frame } else { frame.plus_ticks(-ticks) };
             let after = if frame == scene.end() && frame != scene.start() { frame } else { frame.plus_ticks(ticks) };

@@ -60,14 +60,12 @@ impl<'g> Resolver<'g> {
     }
 
     /// Whether the node reads the param, given the others. A param whose default is the current frame selects a file of
-    /// a sequence, or a
-    /// time of a file, so it is not read without either.
+    /// a sequence, or a time of a file, so it is not read without either.
     fn is_read(&self, index: usize, params: &Params) -> bool {
         let facts = &self.specs[index].facts;
-        let sequence = || self.sources.iter().any(|source| matches!(source, Source::File { numbered: true, .. }));
         let selects = matches!(facts.unset, Unset::CurrentFrame | Unset::CurrentTime);
         let timed = || facts.timed.is_some_and(|timed| timed(params));
-        facts.when.is_none_or(|when| when(params)) && (!selects || sequence() || timed())
+        facts.when.is_none_or(|when| when(params)) && (!selects || self.reads_sequence() || timed())
     }
 
     /// Whether any param that is read changes with time.
@@ -102,6 +100,11 @@ impl<'g> Resolver<'g> {
     /// Whether a param is a file.
     pub(crate) fn reads_files(&self) -> bool {
         self.sources.iter().any(|source| matches!(source, Source::File { .. }))
+    }
+
+    /// Whether a param is a sequence of files.
+    pub(crate) fn reads_sequence(&self) -> bool {
+        self.sources.iter().any(Source::is_sequence)
     }
 
     /// The files of sequences that `params` select, with the names of their params.

@@ -386,10 +386,11 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         let reads = self.plan.delivery(output, frame);
         let geometry = self.geometry(reads.now)?;
         let output = &self.plan.graph.outputs[output];
-        let of_solver = self.plan.nodes[output.from.node].has_solver;
+        let planned = &self.plan.nodes[output.from.node];
+        let (of_solver, whole_frames) = (planned.has_solver, planned.whole_frames);
         let around = reads.around.map(|(results, seconds)| -> Result<_, Arc<CookError>> {
             let [before, after] = results.map(|read| self.geometry(read));
-            Ok(deliver::Around { results: [before?, after?], seconds, of_solver })
+            Ok(deliver::Around { results: [before?, after?], seconds, of_solver, whole_frames })
         });
         let finished = deliver::finish(output, &geometry, around.transpose()?.as_ref());
         finished.map(Arc::new).map_err(|error| Arc::new(self.plan.error(output.from.node, frame, error)))
