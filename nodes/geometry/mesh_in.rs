@@ -10,7 +10,8 @@ params! { PARAMS:
         "An obj, ply or json file with polygons. A run of `#` in its name stands for the frame number, as in \
          `skin.####.obj`.");
     FRAME: Param<i64> = Param::int("frame", 0,
-        "The number of the file to read, if `file` names a numbered sequence. Fractions are rounded down.")
+        "The number of the file to read, if `file` names a numbered sequence. Fractions are rounded down. \
+         Between whole frames of the scene points move in straight lines from one file to the next, if it has the same points.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "Positions of vertices given in the graph instead of a file.").unit(Unit::Metres);

@@ -285,23 +285,40 @@ fn curves_on_a_moving_skin_have_velocities() {
     assert!((v[0].as_f64().unwrap() - 10.0).abs() < 1e-4, "1 m per frame, 10 frames per second: {v}");
 }
 
-/// Points of a sequence are known at whole frames alone. y = f² ÷ 100: 2f ÷ 100 a frame, at 10 frames per second;
-/// (4 − 1) ÷ 100 and (16 − 9) ÷ 100 at the ends.
+/// y = f² ÷ 100 at whole frames and on a line between them, so (f + 1)² − (f − 1)² ÷ 2 = 2f a frame, at 10 frames per second;
+/// 4 − 1 and 16 − 9 at the ends.
 #[test]
-fn what_comes_from_a_sequence_of_files_has_the_difference_over_whole_frames() {
-    let bench = Bench::with_graph(
-        r#"{"convect": 1, "scene": {"frames": [1, 4], "fps": 10}, "nodes": {
+fn points_of_a_sequence_of_files_go_evenly_from_frame_to_frame() {
+    let graph = r#"{"convect": 1, "scene": {"frames": [1, 4], "fps": 10}, "nodes": {
         "in": {"type": "Mesh_In", "params": {"file": "m.####.obj"}},
         "moved": {"type": "Transform", "inputs": {"geometry": "in"}, "params": {"translate": [1, 0, 0]}}
-        }, "outputs": {"o": {"from": "moved", "v": true}}}"#,
-    );
-    for frame in 1..=4 {
+        }, "outputs": {"o": {"from": "moved", "v": true}}}"#;
+    let bench = Bench::with_graph(graph);
+    let write = |frame: i32, faces: &str| {
         let y = f64::from(frame * frame) / 100.0;
-        bench.write(&format!("m.{frame:04}.obj"), &format!("v 0 {y} 0\nv 1 {y} 0\nv 0 {y} 1\nf 1 2 3\n"));
-    }
+        bench.write(&format!("m.{frame:04}.obj"), &format!("v 0 {y} 0\nv 1 {y} 0\nv 0 {y} 1\n{faces}\n"));
+    };
+    (1..=4).for_each(|frame| write(frame, "f 1 2 3"));
+    let y = |file: &str, attribute: &str| {
+        let mesh = &bench.read_json(file)["mesh"];
+        let rows = if attribute == "P" { &mesh["points"] } else { &mesh["point_attributes"]["v"] };
+        rows[0][1].as_f64().unwrap()
+    };
     bench.done(&["cook", "g.json", "--format", "json"]);
     for (frame, expected) in [(1, 0.3), (2, 0.4), (3, 0.6), (4, 0.7)] {
-        let v = bench.read_json(&format!("out/o.000{frame}.json"))["mesh"]["point_attributes"]["v"][0][1].clone();
-        assert!((v.as_f64().unwrap() - expected).abs() < 1e-5, "frame {frame}: {v}");
+        let v = y(&format!("out/o.000{frame}.json"), "v");
+        assert!((v - expected).abs() < 1e-5, "frame {frame}: {v}");
     }
+    bench.done(&["cook", "g.json", "--format", "json", "--frames", "2-4x0.25", "--out", "sub"]);
+    for (file, expected) in [("2", 0.04), ("2_25", 0.0525), ("2_5", 0.065), ("3_75", 0.1425), ("4", 0.16)] {
+        let found = y(&format!("sub/o.000{file}.json"), "P");
+        assert!((found - expected).abs() < 1e-6, "frame {file}: {found}");
+    }
+    // Other faces are another mesh: until its frame the one before it stays.
+    write(3, "f 1 3 2");
+    let args = ["cook", "g.json", "--format", "json", "--frames", "2.5", "--out", "held"];
+    assert!(bench.run(&args).stderr.contains("its mesh: other points or faces half a frame away"));
+    bench.write("g.json", &graph.replace(r#", "v": true"#, ""));
+    bench.done(&args);
+    assert!((y("held/o.0002_5.json", "P") - 0.04).abs() < 1e-6);
 }

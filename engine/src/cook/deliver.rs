@@ -12,10 +12,8 @@ pub(super) struct Around {
     pub(super) results: [Arc<Geometry>; 2],
     /// Seconds between them.
     pub(super) seconds: f64,
-    /// They come from a solver: what has velocities has the solver's.
+    /// They come from a solver: a whole frame away, and what has velocities has the solver's.
     pub(super) of_solver: bool,
-    /// They are whole frames away.
-    pub(super) whole_frames: bool,
 }
 
 /// What an output delivers of `geometry`.
@@ -50,7 +48,7 @@ fn wanted(output: &GraphOutput, name: &Name) -> bool {
 
 fn add_velocity(result: &mut Geometry, around: &Around) -> Result<()> {
     let [before, after] = &around.results;
-    let away = if around.whole_frames { "a frame" } else { "half a frame" };
+    let away = if around.of_solver { "a frame" } else { "half a frame" };
     let kinds: Vec<_> = result.parts().map(|part| part.kind()).collect();
     for kind in kinds {
         let Some(part) = result.part_mut(kind).filter(|part| !around.of_solver || part.get(V).is_none()) else {
@@ -62,8 +60,8 @@ fn add_velocity(result: &mut Geometry, around: &Around) -> Result<()> {
                 let counts = [before, after].map(|part| part.map_or(0, |part| part.point_count()));
                 let now = part.point_count();
                 let fact = match counts {
-                    [a, b] if a == now && b == now => format!("the {kind} are not the same {away} away"),
-                    [a, b] => format!("the {kind} have {a} points {away} before, {now} now and {b} after"),
+                    [a, b] if a == now && b == now => format!("its {kind}: other points or faces {away} away"),
+                    [a, b] => format!("its {kind}: {a} points {away} before, {now} now and {b} after"),
                 };
                 return Err(Error::refused(fact)
                     .hint("velocities need the same points at neighbouring frames; remove `v` from the output"));
@@ -79,7 +77,7 @@ fn add_velocity(result: &mut Geometry, around: &Around) -> Result<()> {
 }
 
 /// Whether points of `a` go on in `b`: as many, joined alike, and the same where they say who they are.
-fn stays(a: &Component, b: &Component) -> bool {
+pub(super) fn stays(a: &Component, b: &Component) -> bool {
     let joined_alike = a.topology().same(b.topology()) || a.topology() == b.topology();
     let known = [(ID.owner, ID.name), (CURVE_ID.owner, CURVE_ID.name)];
     let same_ids = |(owner, name): (Owner, &str)| match (a.table(owner).column(name), b.table(owner).column(name)) {

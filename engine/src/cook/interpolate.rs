@@ -1,8 +1,10 @@
-//! Windows between whole frames: positions on a cubic through the neighbours, so that motion blur does not shimmer.
+//! Results between whole frames: those of windows on a cubic through the neighbours, so that motion blur does not shimmer,
+//! those of sequences of files on a line from one file to the next, as USD has it.
 
 use std::sync::Arc;
 
 use super::call::guarded;
+use super::deliver::stays;
 use super::store::Cooked;
 use crate::error::Result;
 use crate::geometry::{Geometry, P, V};
@@ -47,6 +49,27 @@ fn interpolated_geometry(near: [&Geometry; 4], share: f32) -> Geometry {
         }
     }
     result
+}
+
+/// What a source of numbered files gives `share` of the way from one whole frame to the next: `P` and `v` of points that
+/// are in both are interpolated linearly, all else is that of the first.
+pub(super) fn between_files([from, to]: [&Cooked; 2], share: f32) -> Cooked {
+    let one = |(from, to): (&Arc<Geometry>, &Arc<Geometry>)| {
+        let mut result = (**from).clone();
+        for part in from.parts() {
+            let Some(next) = to.part(part.kind()).filter(|next| stays(part, next)) else { continue };
+            for attribute in [P, V] {
+                let (Some(a), Some(b)) = (part.get(attribute), next.get(attribute)) else { continue };
+                let on_line = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|k| a[k] + share * (b[k] - a[k]));
+                let mixed: Vec<[f32; 3]> = a.iter().zip(b).map(on_line).collect();
+                if let Some(part) = result.part_mut(part.kind()) {
+                    part.set(attribute, mixed).expect("as many rows as before");
+                }
+            }
+        }
+        Arc::new(result)
+    };
+    from.iter().zip(to.iter()).map(one).collect()
 }
 
 /// The cubic through `b` and `c` with slopes (c−a)/2 and (d−b)/2, relative to `b` so that far from 0 nothing is lost.

@@ -161,6 +161,24 @@ impl<'p, 'g> Keys<'p, 'g> {
                 let hasher = self.hasher.tag(3).i64(frame.ticks());
                 states.into_iter().fold(hasher, Hasher::key);
             }
+            Body::Node { .. } if let Some((near, _)) = plan.files_between(node, frame) => {
+                let known = near.map(|whole| self.nodes[node].frames.get(&whole).cloned());
+                let missing: Missing = near
+                    .into_iter()
+                    .zip(&known)
+                    .filter(|(_, known)| known.is_none())
+                    .map(|(at, _)| (node, at))
+                    .collect();
+                let [Some(before), Some(after)] = known else { return Err(missing) };
+                match (before, after) {
+                    (Ok(before), Ok(after)) if before.key == after.key => return Ok(Ok(before.key)),
+                    (Ok(before), Ok(after)) => {
+                        let within = frame.ticks() - frame.floor().ticks();
+                        self.hasher.tag(9).i64(within).key(before.key).key(after.key);
+                    }
+                    (Err(error), _) | (_, Err(error)) => return Ok(Err(error)),
+                }
+            }
             Body::Node { node: declared, .. } => {
                 let inputs = match self.input_keys(reads)? {
                     Ok(inputs) => inputs,

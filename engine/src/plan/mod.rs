@@ -63,8 +63,8 @@ pub(crate) struct PlannedNode<'g> {
     pub(crate) varies: bool,
     /// Whether it is a solver or depends on one: cooked at whole frames only, in order.
     pub(crate) has_solver: bool,
-    /// Whether its result within a frame is that of the frame's start: it has a solver, or comes from a sequence of files.
-    pub(crate) whole_frames: bool,
+    /// Whether it is a source that reads a sequence of files: between whole frames it goes from one to the next.
+    pub(crate) reads_sequence: bool,
     /// Whether a later frame may have the same key: it varies by params and files alone.
     pub(crate) may_hold: bool,
     /// Whether a reader asks for its result at the scene's first frame.
@@ -212,7 +212,7 @@ impl<'g> PlannedNode<'g> {
             requested: false,
             varies: false,
             has_solver: false,
-            whole_frames: false,
+            reads_sequence: false,
             may_hold: false,
             read_at_start: false,
             live: None,
@@ -232,8 +232,8 @@ fn plan_node<'g>(
     before: &mut [PlannedNode<'g>],
 ) -> PlannedNode<'g> {
     let resolver = Resolver::new(node, graph, files);
-    let (varies, may_hold, has_solver, whole_frames) = match &node.body {
-        Body::Given { moves, .. } => (*moves, false, false, false),
+    let (varies, may_hold, has_solver) = match &node.body {
+        Body::Given { moves, .. } => (*moves, false, false),
         Body::Node { node: declared, inputs, .. } => {
             let start = resolver.at(graph.scene.start());
             // Where params are refused at the start, the error comes out when that frame is cooked.
@@ -255,16 +255,13 @@ fn plan_node<'g>(
             let pure = matches!(declared.cook, Cook::Pure(_));
             let may_hold = pure && !reads(&|source| source.varies && !source.may_hold);
             let has_solver = matches!(declared.cook, Cook::Solver(..)) || reads(&|source| source.has_solver);
-            // A window's results within a frame are interpolated between whole ones.
-            let holds = !matches!(declared.cook, Cook::Window(..))
-                && (resolver.reads_sequence() || reads(&|source| source.whole_frames));
-            (clock || resolver.is_animated() || moving_input, may_hold, has_solver, has_solver || holds)
+            (clock || resolver.is_animated() || moving_input, may_hold, has_solver)
         }
     };
     PlannedNode {
         varies,
         has_solver,
-        whole_frames,
+        reads_sequence: node.node().is_some_and(|declared| declared.inputs.is_empty()) && resolver.reads_sequence(),
         may_hold,
         resolver,
         needed: true,

@@ -153,10 +153,10 @@ impl<'g> Plan<'g> {
         }
     }
 
-    /// Samples of an input within the step to `frame`, the frame before first. What solvers and sequences of files give is
-    /// known at whole frames only.
+    /// Samples of an input within the step to `frame`, the frame before first. A solver and what depends on it are known
+    /// at whole frames only.
     fn step_samples(&self, links: &[Link], steps: u8, frame: Frame) -> Vec<Frame> {
-        let whole = links.iter().any(|link| self.nodes[link.node].whole_frames);
+        let whole = links.iter().any(|link| self.nodes[link.node].has_solver);
         let steps = if whole { 1 } else { i64::from(steps) };
         let before = frame.plus(-1);
         (0..=steps).map(|k| before.plus_ticks(Frame::TICKS * k / steps)).collect()
@@ -175,6 +175,15 @@ impl<'g> Plan<'g> {
         OutputFrames::Between([floor - 1, floor, floor + 1, after], share)
     }
 
+    /// The two whole frames between which a source of numbered files goes at `frame`, and the share of the way; `None` at
+    /// whole frames and past the scene, where there may be no further file.
+    pub(crate) fn files_between(&self, node: usize, frame: Frame) -> Option<([Frame; 2], f32)> {
+        let before = frame.floor();
+        let is_between = !frame.is_whole() && before < self.graph.scene.end();
+        let share = (frame.ticks() - before.ticks()) as f32 / Frame::TICKS as f32;
+        (self.nodes[node].reads_sequence && is_between).then(|| ([before, before.plus(1)], share))
+    }
+
     /// The frame whose result of `node` is read again at later frames: the only one where the node is the same at all
     /// frames, the scene's first where a reader looks back to it.
     pub(crate) fn reread_frame(&self, node: usize) -> Option<Frame> {
@@ -185,8 +194,8 @@ impl<'g> Plan<'g> {
     }
 
     /// The results that a delivered frame of an output is made of. Velocities that the node does not write itself are
-    /// the difference over half a frame each way, or a whole one where it comes from a solver or a sequence of files, which
-    /// have no others; one-sided at the scene's ends.
+    /// the difference over half a frame each way, or a whole one where it comes from a solver, which has no others;
+    /// one-sided at the scene's ends.
     pub(crate) fn delivery(&self, output: usize, frame: Frame) -> DeliveryReads {
         let scene = &self.graph.scene;
         let from = self.graph.outputs[output].from;
@@ -197,17 +206,31 @@ impl<'g> Plan<'g> {
         DeliveryReads { now: self.read(from, frame), around }
     }
 
-    /// The frames whose difference is an output's velocity at `frame`; `None` where it has none, or the node's own. A scene of
-    /// one frame need not have another file to read.
+    /// Of the results of `node` in a slice, up to `last`, the first that later frames may read, or have the key of.
+    pub(crate) fn reread_since(&self, node: usize, last: Frame) -> Option<Frame> {
+        let planned = &self.nodes[node];
+        if planned.varies && self.gives_differences(node) {
+            // What came half a frame after the slice's last frame comes half a frame before a later one, too.
+            let next = self.request.frames.at_or_after(last.plus_ticks(1 - HALF))?;
+            return Some(next.plus_ticks(-HALF));
+        }
+        (planned.varies && planned.may_hold).then_some(last)
+    }
+
+    /// Whether velocities of a requested output are differences of what `node` gives.
+    fn gives_differences(&self, node: usize) -> bool {
+        let mut outputs = self.request.outputs.iter().filter(|output| self.graph.outputs[**output].from.node == node);
+        outputs.any(|output| self.velocity_frames(*output, self.graph.scene.start()).is_some())
+    }
+
+    /// The frames whose difference is an output's velocity at `frame`; `None` where it has none, or the node's own.
     fn velocity_frames(&self, output: usize, frame: Frame) -> Option<[Frame; 2]> {
         let scene = &self.graph.scene;
         let output = &self.graph.outputs[output];
         let node = output.from.node;
         let writes_v = |node: &Node| node.writes.iter().any(|attribute| attribute.spec().0 == V.name);
         let own = self.graph.nodes[node].node().is_some_and(writes_v);
-        let planned = &self.nodes[node];
-        let whole = planned.has_solver || planned.whole_frames && scene.start() != scene.end();
-        let ticks = if whole { Frame::TICKS } else { HALF };
+        let ticks = if self.nodes[node].has_solver { Frame::TICKS } else { HALF };
         (output.v && !own).then(|| {
             let before = if frame == scene.start() { frame } else { frame.plus_ticks(-ticks) };
             let after = if frame == scene.end() && frame != scene.start() { frame } else { frame.plus_ticks(ticks) };

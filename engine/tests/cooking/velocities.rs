@@ -1,6 +1,7 @@
 //! Velocities of outputs whose node does not compute any.
 
 use engine::geometry::{Geometry, ID, Kind, V};
+use engine::time::Frame;
 
 use crate::builder::{Cooked, TestGraph, at, engine, row};
 use crate::nodes::{ADD, BOUNCE, CLOCK, FOLLOW, SOURCE};
@@ -58,6 +59,17 @@ fn velocities_do_not_depend_on_which_frames_are_requested() {
     }
 }
 
+/// With this little memory a slice has one frame; what comes half a frame after it is kept for the next.
+#[test]
+fn what_a_velocity_reads_is_cooked_once() {
+    for (step, calls) in [(1.0, 19), (0.5, 19), (0.25, 37)] {
+        let frames: Vec<Frame> = (0..).map(|k| at(1.0 + step * f64::from(k))).take_while(|f| *f <= at(10.0)).collect();
+        let cooked = squares().cook_with(&engine(1, 2048), &frames, None);
+        assert_eq!(cooked.cooks("clock"), calls, "every {step} frames");
+        assert_eq!(v(&cooked, 5.0), 240.0);
+    }
+}
+
 /// Symplectic Euler: x = 10 − g dt² n(n + 1)/2 after n steps, whose difference over two frames is −g dt (n + ½).
 #[test]
 fn what_comes_from_a_solver_has_the_difference_over_whole_frames() {
@@ -94,7 +106,7 @@ fn changing(at: impl Fn(bool) -> Geometry + Send + Sync + 'static) -> Cooked {
 #[test]
 fn a_change_of_the_number_of_points_is_refused_only_at_that_frame() {
     let cooked = changing(|later| row(if later { &[0.0, 1.0, 2.0] } else { &[0.0, 1.0] }));
-    let fact = "the points have 2 points half a frame before, 3 now and 3 after";
+    let fact = "its points: 2 points half a frame before, 3 now and 3 after";
     let hint = "velocities need the same points at neighbouring frames; remove `v` from the output";
     assert_eq!(cooked.error(), format!("`add` (Add) at frame 3: {fact}; {hint}"));
     assert_eq!(cooked.found.keys().map(|(_, frame)| frame.number()).collect::<Vec<_>>(), [1.0, 2.0, 4.0, 5.0]);
@@ -108,5 +120,5 @@ fn points_with_other_ids_are_not_the_same_points() {
         geometry
     };
     let cooked = changing(move |later| with_ids(if later { [2, 3] } else { [1, 2] }));
-    assert!(cooked.error().contains("the points are not the same half a frame away"), "{}", cooked.error());
+    assert!(cooked.error().contains("its points: other points or faces half a frame away"), "{}", cooked.error());
 }

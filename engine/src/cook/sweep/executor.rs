@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::cook::call::{Call, Returned, check_finite};
-use crate::cook::interpolate::interpolated;
+use crate::cook::interpolate::{between_files, interpolated};
 use crate::cook::store::{Cooked, Metrics};
 use crate::cook::types::completed;
 use crate::error::{Error, Result};
@@ -103,6 +103,14 @@ impl Executor {
             Some(saved) => (saved.save)(&state)
                 .and_then(|bytes| (saved.load)(&bytes))
                 .ok_or_else(|| Error::contract("its state cannot be written and read back")),
+        }
+    }
+
+    /// The outputs of a source of numbered files `share` of the way from one whole frame to the next.
+    pub(super) fn between_files(self, near: [&Cooked; 2], share: f32) -> Cooked {
+        match self {
+            Self::Rehearsal => near[0].clone(),
+            Self::Cook | Self::Check | Self::Types | Self::Reload => between_files(near, share),
         }
     }
 

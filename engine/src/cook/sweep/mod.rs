@@ -91,8 +91,8 @@ struct NodeRun<'p> {
     on_disk: OnDisk,
     /// Mean wall time of a call in the last slice.
     call_time: Duration,
-    /// Key of the result that is kept because later frames may have the same.
-    held: Option<ContentKey>,
+    /// Keys of results that are kept because later frames may have the same, or read them.
+    held: BTreeMap<Frame, ContentKey>,
     masks: Masks,
     /// Metrics that were not finite at some frame.
     left_out_metrics: BTreeSet<&'static str>,
@@ -139,7 +139,7 @@ impl<'p> NodeRun<'p> {
             integrals: integrates.map(|node| Integrals::new(&planned.resolver, node, &plan.graph.scene, cancel)),
             on_disk: OnDisk::default(),
             call_time: Duration::MAX,
-            held: None,
+            held: BTreeMap::new(),
             masks: Masks::new(),
             left_out_metrics: BTreeSet::new(),
             jumps: Jumps::default(),
@@ -386,11 +386,10 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         let reads = self.plan.delivery(output, frame);
         let geometry = self.geometry(reads.now)?;
         let output = &self.plan.graph.outputs[output];
-        let planned = &self.plan.nodes[output.from.node];
-        let (of_solver, whole_frames) = (planned.has_solver, planned.whole_frames);
+        let of_solver = self.plan.nodes[output.from.node].has_solver;
         let around = reads.around.map(|(results, seconds)| -> Result<_, Arc<CookError>> {
             let [before, after] = results.map(|read| self.geometry(read));
-            Ok(deliver::Around { results: [before?, after?], seconds, of_solver, whole_frames })
+            Ok(deliver::Around { results: [before?, after?], seconds, of_solver })
         });
         let finished = deliver::finish(output, &geometry, around.transpose()?.as_ref());
         finished.map(Arc::new).map_err(|error| Arc::new(self.plan.error(output.from.node, frame, error)))

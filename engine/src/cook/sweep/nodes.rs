@@ -77,7 +77,13 @@ impl<'g> Sweep<'_, 'g, '_> {
         };
         match declared.cook {
             Cook::Pure(_) | Cook::Frame { .. } => {
-                self.cook_frames(node, declared, &demand.frames, |cx| declared.cook_frame(cx));
+                let (between, mut frames): (BTreeSet<Frame>, BTreeSet<Frame>) =
+                    demand.frames.into_iter().partition(|frame| self.plan.files_between(node, *frame).is_some());
+                let near = between.iter().filter_map(|frame| self.plan.files_between(node, *frame));
+                let near: BTreeSet<Frame> = near.flat_map(|(near, _)| near).collect();
+                frames.extend(near.into_iter().filter(|frame| self.is_missing(node, *frame)));
+                self.cook_frames(node, declared, &frames, |cx| declared.cook_frame(cx));
+                between.into_iter().for_each(|frame| self.go_between_files(node, frame));
             }
             Cook::Window(chain, _) => self.cook_chain(node, declared, chain, demand),
             Cook::Solver(chain, _) => self.cook_chain(node, declared, chain, demand),
@@ -127,6 +133,17 @@ impl<'g> Sweep<'_, 'g, '_> {
                 self.publish(node, frame, &metrics);
             }
         }
+    }
+
+    /// Gives a source of numbered files its result between two whole frames, which have theirs.
+    fn go_between_files(&mut self, node: usize, frame: Frame) {
+        let Some((near, share)) = self.plan.files_between(node, frame) else { return };
+        let found = near.map(|whole| self.nodes[node].results.get(&whole).cloned());
+        let [Some(before), Some(after)] = found else { return };
+        let outcome = before.and_then(|before| Ok(self.executor.between_files([&before, &after?], share)));
+        self.nodes[node].results.insert(frame, outcome);
+        let metrics = self.published(node, near[0]);
+        self.publish(node, frame, &metrics);
     }
 
     /// Counts a call, unless an error upstream or at an earlier frame kept it from being made.

@@ -1,6 +1,7 @@
 //! What is kept from slice to slice and from cook to cook, and what is dropped.
 
 use super::Sweep;
+use crate::cook::store::Cooked;
 use crate::key::ContentKey;
 use crate::time::Frame;
 
@@ -13,10 +14,7 @@ impl Sweep<'_, '_, '_> {
         if let Some(frame) = self.plan.reread_frame(node) {
             self.keep_reread(node, frame);
         }
-        let planned = &self.plan.nodes[node];
-        if planned.varies && planned.may_hold {
-            self.keep_last(node);
-        }
+        self.keep_last(node);
     }
 
     fn keep_reread(&mut self, node: usize, frame: Frame) {
@@ -34,25 +32,30 @@ impl Sweep<'_, '_, '_> {
         });
     }
 
-    /// Keeps the last result instead of the one kept before: the next frame may have the same key.
+    /// Keeps the last results, which the next slice may read, or results of the same key; drops those kept before that it
+    /// may not.
     fn keep_last(&mut self, node: usize) {
-        let run = &mut self.nodes[node];
-        let Some((frame, Ok(cooked))) = run.results.last_key_value() else { return };
-        let Ok(resolved) = self.keys.resolve(node, *frame) else { return };
-        if run.held == Some(resolved.key) {
-            return;
+        let last = self.nodes[node].results.last_key_value().map(|(frame, _)| *frame);
+        let Some(since) = last.and_then(|last| self.plan.reread_since(node, last)) else { return };
+        let made = self.nodes[node].results.range(since..);
+        let made: Vec<(Frame, Cooked)> =
+            made.filter_map(|(frame, outcome)| Some((*frame, outcome.as_ref().ok()?.clone()))).collect();
+        let mut held = self.nodes[node].held.split_off(&since);
+        for (frame, cooked) in made {
+            let Ok(resolved) = self.keys.resolve(node, frame) else { continue };
+            held.insert(frame, resolved.key);
+            if self.own.insert(resolved.key) {
+                let metrics = self.published(node, frame);
+                self.engine.store(|store| store.keep(resolved.key, &cooked, metrics));
+            }
         }
-        let (frame, cooked) = (*frame, cooked.clone());
-        let before: Option<ContentKey> = run.held.replace(resolved.key);
-        self.own.insert(resolved.key);
-        if let Some(before) = before {
-            self.own.remove(&before);
+        let before = std::mem::replace(&mut self.nodes[node].held, held);
+        for key in before.into_values() {
+            if !self.nodes[node].held.values().any(|held| *held == key) {
+                self.own.remove(&key);
+                self.engine.store(|store| store.drop(key));
+            }
         }
-        let metrics = self.published(node, frame);
-        self.engine.store(|store| {
-            before.into_iter().for_each(|key| store.drop(key));
-            store.keep(resolved.key, &cooked, metrics);
-        });
     }
 
     /// Whether nobody has the result; takes it from memory where it is there.
