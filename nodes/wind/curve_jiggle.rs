@@ -20,7 +20,7 @@
 use crate::shared::clump;
 use crate::shared::group::{self, Group};
 use curves::attach::{RootPositions, SkinBinding};
-use curves::jiggle::{Drag, Jiggle, MASK_RANGE, RigidStep, Spring, steps_to_forget, with_lengths_between};
+use curves::jiggle::{Drag, Jiggle, MASK_RANGE, RigidStep, Spring, steps_to_forget, with_lengths_of};
 use engine::prelude::*;
 use numerics::masked::Masked;
 use numerics::ramp::Ramp;
@@ -87,7 +87,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Jiggle",
-    2,
+    3,
     "Makes curves lag behind their incoming motion and swing: they follow a gust softly and overshoot when it stops. A \
      damped spring ties each CV to its position on the incoming curve, stiff at the root and soft at the tip. Any \
      frame can be cooked alone.",
@@ -107,7 +107,7 @@ pub(crate) static NODE: Node = Node::new(
     _ if params.get(INHERIT_MOTION).value == 0.0 => vec![LeftOut::new("skin", "`inherit_motion` is 0")],
     _ => Vec::new(),
 })
-.restores_between(keep_lengths);
+.follows(&CURVES, keep_lengths);
 
 /// The state: springs, and the geometry that the next step needs.
 struct Swing {
@@ -308,15 +308,11 @@ fn past(params: &Params, clock: Clock) -> Past {
     Past { frames: steps_to_forget(phase, range(&params.get(DAMPING)), params.get(TOLERANCE)), preroll }
 }
 
-/// Between two frames, segment lengths are interpolated too.
-fn keep_lengths(near: [&Geometry; 2], share: f32, between: &mut Geometry) {
-    let [Some(from), Some(to)] = near.map(Geometry::curves) else { return };
-    let Some(curves) = between.part_mut(Kind::Curves) else { return };
-    if from.runs() != to.runs() {
-        return;
-    }
-    if let Some(points) = curves.edit(P) {
-        with_lengths_between(from.runs().starts(), [from.positions(), to.positions()], share, points);
+/// Between two frames, too, segments have the lengths of those of `curves`.
+fn keep_lengths(input: &Geometry, between: &mut Geometry) {
+    let (Some(curves), Some(swinging)) = (input.curves(), between.part_mut(Kind::Curves)) else { return };
+    if let Some(points) = swinging.edit(P) {
+        with_lengths_of(curves.positions(), curves.runs().starts(), points);
     }
 }
 

@@ -6,29 +6,70 @@ use std::sync::Arc;
 use super::call::guarded;
 use super::deliver::stays;
 use super::store::Cooked;
-use crate::error::Result;
-use crate::geometry::{Geometry, P, V};
+use crate::error::{Error, Result};
+use crate::geometry::{Component, Geometry, P, V};
 use crate::node::RestoreBetween;
 
+/// The input whose points a window moves, at the frame that is asked for and at the whole frames around.
+pub(super) struct Followed<'a> {
+    pub(super) now: &'a Geometry,
+    pub(super) near: [&'a Geometry; 4],
+    pub(super) restore: RestoreBetween,
+}
+
 /// The results of a window `share` of the way from `near[1]` to `near[2]`; `near[0]` and `near[3]` are the frames before
-/// and after. `P` and `v` go along the cubic Hermite through them (Catmull–Rom slopes); all else is that of `near[1]`.
-/// `restore` then corrects each output.
+/// and after. What it moves the points of the `followed` input by goes along the cubic Hermite through them (Catmull–Rom
+/// slopes), and is added to that input; without one `P` and `v` themselves do, and all else is that of `near[1]`.
 ///
 /// # Errors
-/// Where `restore` panics.
-pub(super) fn interpolated(near: [&Cooked; 4], share: f32, restore: Option<RestoreBetween>) -> Result<Cooked> {
+/// Where the followed input has other points at one of these frames, or where its restoration panics.
+pub(super) fn interpolated(near: [&Cooked; 4], share: f32, followed: Option<Followed<'_>>) -> Result<Cooked> {
     let one = |port: usize| {
         let near = near.map(|cooked| &*cooked[port]);
-        let mut result = interpolated_geometry(near, share);
-        if let Some(restore) = restore {
-            guarded(|| {
-                restore([near[1], near[2]], share, &mut result);
-                Ok(())
-            })?;
-        }
+        let result = match &followed {
+            Some(followed) => followed.moved(near, share)?,
+            None => interpolated_geometry(near, share),
+        };
         Ok(Arc::new(result))
     };
     (0..near[1].len()).map(one).collect()
+}
+
+impl Followed<'_> {
+    fn moved(&self, near: [&Geometry; 4], share: f32) -> Result<Geometry> {
+        let mut result = self.now.clone();
+        for part in self.now.parts() {
+            let count = part.point_count();
+            let (Some([a, b, c, d]), Some([e, f, g, h])) = (rows_of(near, part), rows_of(self.near, part)) else {
+                return Err(Error::refused(format!("its {} have other points between frames", part.kind())));
+            };
+            let moved = |row: usize| {
+                std::array::from_fn(|k| {
+                    let by =
+                        [a[row][k] - e[row][k], b[row][k] - f[row][k], c[row][k] - g[row][k], d[row][k] - h[row][k]];
+                    part.positions()[row][k] + hermite(by, share)
+                })
+            };
+            let moved: Vec<[f32; 3]> = (0..count).map(moved).collect();
+            if let Some(part) = result.part_mut(part.kind()) {
+                part.set(P, moved)?;
+            }
+        }
+        guarded(|| {
+            (self.restore)(self.now, &mut result);
+            Ok(())
+        })?;
+        Ok(result)
+    }
+}
+
+/// The positions of each geometry's component of the kind of `part`, if all have as many points.
+fn rows_of<'a>(near: [&'a Geometry; 4], part: &Component) -> Option<[&'a [[f32; 3]]; 4]> {
+    let of = |geometry: &'a Geometry| {
+        geometry.part(part.kind()).map(Component::positions).filter(|rows| rows.len() == part.point_count())
+    };
+    let [a, b, c, d] = near.map(of);
+    Some([a?, b?, c?, d?])
 }
 
 fn interpolated_geometry(near: [&Geometry; 4], share: f32) -> Geometry {

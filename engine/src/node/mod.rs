@@ -154,15 +154,23 @@ pub struct Node {
     pub checks: Option<fn(&Params) -> crate::Result<()>>,
     /// What [`FrameCx::integrals`] integrates over time; reads only params declared [`crate::param::Param::history`].
     pub integrands: [Option<Integrand>; MOST_INTEGRANDS],
-    /// Restores what interpolation between a window's frames does not keep; see [`Node::restores_between`].
-    pub restore_between: Option<RestoreBetween>,
+    /// What a window's output is made of between whole frames; see [`Node::follows`].
+    pub follows: Option<Follows>,
     /// Params that trade accuracy for time.
     pub accuracy: &'static [Accuracy],
 }
 
-/// Corrects an output of a window between two whole frames, at `share` (0..1) from the first, whose outputs are `near`.
-/// `P` and `v` of `between` are interpolated by a cubic, everything else is that of the first frame.
-pub type RestoreBetween = fn(near: [&Geometry; 2], share: f32, between: &mut Geometry);
+/// The input whose points a window moves; see [`Node::follows`].
+#[derive(Clone, Copy, Debug)]
+pub struct Follows {
+    /// Its name.
+    pub input: &'static str,
+    /// Corrects the output between two whole frames.
+    pub restore: RestoreBetween,
+}
+
+/// Corrects an output of a window between two whole frames, given the input that it follows.
+pub type RestoreBetween = fn(input: &Geometry, between: &mut Geometry);
 
 impl Node {
     /// A node of that name; `version` is raised when its bits change.
@@ -187,7 +195,7 @@ impl Node {
             explains: None,
             checks: None,
             integrands: [None; MOST_INTEGRANDS],
-            restore_between: None,
+            follows: None,
             accuracy: &[],
         }
     }
@@ -292,11 +300,12 @@ impl Node {
         self
     }
 
-    /// Called for each output of a window between two whole frames, where positions are interpolated, to restore what
-    /// the node guarantees at whole frames, such as lengths.
+    /// The output of this window is an input with its points moved. Between whole frames it is that input at that time, its
+    /// points moved by what the window moved them by at the frames around, interpolated; `restore` then corrects what that does
+    /// not preserve, such as lengths. Of other windows `P` and `v` themselves are interpolated.
     #[must_use]
-    pub const fn restores_between(mut self, restore: RestoreBetween) -> Self {
-        self.restore_between = Some(restore);
+    pub const fn follows(mut self, input: &Input<One>, restore: RestoreBetween) -> Self {
+        self.follows = Some(Follows { input: input.name(), restore });
         self
     }
 

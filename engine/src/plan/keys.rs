@@ -158,8 +158,17 @@ impl<'p, 'g> Keys<'p, 'g> {
                         Err(error) => return Ok(Err(error)),
                     }
                 }
+                // And of the input that it follows there.
+                let followed = match frame.is_whole() {
+                    true => None,
+                    false => match self.input_keys(reads)? {
+                        Ok(inputs) => Some(inputs),
+                        Err(error) => return Ok(Err(error)),
+                    },
+                };
                 let hasher = self.hasher.tag(3).i64(frame.ticks());
-                states.into_iter().fold(hasher, Hasher::key);
+                let hasher = states.into_iter().fold(hasher, Hasher::key);
+                followed.into_iter().for_each(|inputs| inputs.hash(hasher));
             }
             Body::Node { .. } if let Some((near, _)) = plan.files_between(node, frame) => {
                 let known = near.map(|whole| self.nodes[node].frames.get(&whole).cloned());

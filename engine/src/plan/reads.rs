@@ -9,7 +9,7 @@ use super::Plan;
 use crate::error::CookError;
 use crate::geometry::V;
 use crate::graph::{Body, Link};
-use crate::node::{Cook, Node, Times};
+use crate::node::{Cook, InputSpec, Node, Times};
 use crate::param::Params;
 use crate::time::Frame;
 
@@ -23,7 +23,7 @@ pub(crate) enum Moment {
     /// The state of a window or solver moves to this whole frame from the one before.
     ChainStep(i64),
     /// The output of a window or solver at this frame. Between whole frames it is made of the outputs at
-    /// [`Plan::output_frames`] and reads no input.
+    /// [`Plan::output_frames`] and of the input that the node follows, if any.
     ChainOutput(Frame),
 }
 
@@ -116,8 +116,8 @@ impl<'g> Plan<'g> {
             Body::Given { .. } => Vec::new(),
             Body::Node { node: declared, inputs, .. } => {
                 let wired = declared.inputs.iter().map(|input| input.spec()).zip(inputs);
-                let read = |(spec, links): (crate::node::InputSpec, &'g Vec<Link>)| {
-                    let (now, start, steps) = self.frames_read((spec.times)(&params), declared, links, moment);
+                let read = |(spec, links): (InputSpec, &'g Vec<Link>)| {
+                    let (now, start, steps) = self.frames_read(&spec, &params, declared, links, moment);
                     InputReads { name: spec.name, links, now, start, steps }
                 };
                 wired.map(read).collect()
@@ -126,15 +126,16 @@ impl<'g> Plan<'g> {
         Ok(Reads { params, inputs })
     }
 
-    /// Frames for `now`, `start` and `steps` of an input that is read at `times`.
+    /// Frames for `now`, `start` and `steps` of an input.
     fn frames_read(
         &self,
-        times: Times,
+        spec: &InputSpec,
+        params: &Params,
         declared: &Node,
         links: &[Link],
         moment: Moment,
     ) -> (Option<Frame>, Option<Frame>, Vec<Frame>) {
-        let at = moment.frame();
+        let (at, times) = (moment.frame(), (spec.times)(params));
         let now = times.now.then_some(at);
         let scene_start = self.graph.scene.start();
         match moment {
@@ -149,7 +150,10 @@ impl<'g> Plan<'g> {
                 let steps = if times.steps > 0 { self.step_samples(links, times.steps, at) } else { Vec::new() };
                 (now, None, steps)
             }
-            Moment::ChainOutput(frame) => (now.filter(|_| frame.is_whole()), None, Vec::new()),
+            Moment::ChainOutput(frame) => {
+                let is_followed = declared.follows.is_some_and(|follows| follows.input == spec.name);
+                (now.filter(|_| frame.is_whole() || is_followed), None, Vec::new())
+            }
         }
     }
 

@@ -412,12 +412,11 @@ const FOLLOW_NODE: Node = Node::new("Follow", 1, "Points that lag.", Cook::resum
 /// Follows its input, by half of the distance per frame.
 pub(crate) static FOLLOW: Node = FOLLOW_NODE;
 
-/// The same, with linear interpolation between frames.
-pub(crate) static CORRECTED: Node =
-    Node { name: "Corrected", ..FOLLOW_NODE }.restores_between(|[from, to], share, between| {
-        let straight = first_x(from) + (first_x(to) - first_x(from)) * share;
-        *between = moved(between, |_| straight).expect("as many rows as before");
-    });
+/// The same, as points that move `points`; between frames they are 10 further along than that.
+pub(crate) static MOVING: Node = Node { name: "Moving", ..FOLLOW_NODE }.follows(&FOLLOW_POINTS, |input, between| {
+    let moved_by = first_x(between) - first_x(input);
+    *between = moved(input, |x| x + moved_by + 10.0).expect("as many rows as before");
+});
 
 // ——— solver ———
 

@@ -6,7 +6,7 @@ use engine::geometry::{Column, Owner};
 use engine::time::Frame;
 
 use crate::builder::{TestGraph, at, engine, keyed, row};
-use crate::nodes::{CLOCK, CORRECTED, DRIFT, FAIL, FOLLOW, Probe, SOURCE};
+use crate::nodes::{CLOCK, DRIFT, FAIL, FOLLOW, MOVING, Probe, SOURCE};
 
 /// A weak reference to an array of positions.
 type Positions = Weak<Vec<[f32; 3]>>;
@@ -125,11 +125,6 @@ fn between_frames_a_window_is_interpolated_by_a_cubic() {
     let whole = graph.cook(1..=40);
     let frames = [9.0, 9.25, 9.5, 10.0, 16.7, 39.5].map(at);
     let cooked = graph.cook_with(&engine(2, 1 << 30), &frames, None);
-    let cubic = |a: f64, b: f64, c: f64, d: f64, t: f64| {
-        let (from, to) = ((c - a) / 2.0, (d - b) / 2.0);
-        let (t2, t3) = (t * t, t * t * t);
-        (2.0 * t3 - 3.0 * t2 + 1.0) * b + (t3 - 2.0 * t2 + t) * from + (3.0 * t2 - 2.0 * t3) * c + (t3 - t2) * to
-    };
     for frame in [9.25, 9.5, 16.7, 39.5_f64] {
         // There is no frame after the scene's last, so the last is used twice.
         let near = [-1.0, 0.0, 1.0, 2.0].map(|k| f64::from(whole.x((frame.floor() + k).min(40.0))));
@@ -145,23 +140,34 @@ fn between_frames_a_window_is_interpolated_by_a_cubic() {
     }
 }
 
+/// The cubic Hermite from `b` to `c` with Catmull–Rom slopes.
+fn cubic(a: f64, b: f64, c: f64, d: f64, t: f64) -> f64 {
+    let (from, to) = ((c - a) / 2.0, (d - b) / 2.0);
+    let (t2, t3) = (t * t, t * t * t);
+    (2.0 * t3 - 3.0 * t2 + 1.0) * b + (t3 - 2.0 * t2 + t) * from + (3.0 * t2 - 2.0 * t3) * c + (t3 - t2) * to
+}
+
+/// What is interpolated is how far the points are from those they follow; the node corrects the result.
 #[test]
-fn interpolated_frames_and_only_those_are_corrected_by_the_node() {
+fn between_frames_a_window_moves_the_input_that_it_follows() {
     let mut graph = follow(40, 8);
-    let moving = engine::graph::Link { node: graph.index("moving"), port: 0 };
-    graph.add("corrected", &CORRECTED).set("frames", 8_i64).set("rate", 0.3_f32).wire("points", moving).out();
+    let input = engine::graph::Link { node: graph.index("moving"), port: 0 };
+    graph.add("mover", &MOVING).set("frames", 8_i64).set("rate", 0.3_f32).wire("points", input).out();
+    graph.output(input);
     let frames = [9.0, 9.25, 16.5, 39.5].map(at);
     let cooked = graph.cook_with(&engine(2, 1 << 30), &frames, None);
     let whole = graph.cook(1..=40);
-    let x = |graph: &crate::builder::Cooked, frame: f64| {
-        graph.found[&(1, at(frame))].points().expect("points").positions()[0][0]
+    let x = |cooked: &crate::builder::Cooked, output: usize, frame: f64| {
+        f64::from(cooked.found[&(output, at(frame))].points().expect("points").positions()[0][0])
     };
     for frame in [9.25, 16.5, 39.5_f64] {
-        let [from, to] = [frame.floor(), frame.floor() + 1.0].map(|frame| x(&whole, frame));
-        assert_eq!(x(&cooked, frame), from + (to - from) * frame.fract() as f32, "frame {frame}");
-        assert_ne!(x(&cooked, frame), cooked.x(frame), "frame {frame}");
+        let near = [-1.0, 0.0, 1.0, 2.0].map(|k| (frame.floor() + k).min(40.0));
+        let [a, b, c, d] = near.map(|frame| x(&whole, 1, frame) - x(&whole, 2, frame));
+        let moved_by = cubic(a, b, c, d, frame.fract());
+        let found = x(&cooked, 1, frame);
+        assert!((found - (x(&cooked, 2, frame) + moved_by + 10.0)).abs() < 1e-5, "frame {frame}: {found}");
     }
-    assert_eq!(x(&cooked, 9.0), cooked.x(9.0));
+    assert_eq!(x(&cooked, 1, 9.0), x(&cooked, 0, 9.0), "a whole frame is what the node gives");
 }
 
 #[test]

@@ -5,10 +5,20 @@ use std::sync::Arc;
 
 use super::demand::{Advance, Arrival, ChainFrame, NodeDemand, ReadsOrError};
 use super::{ChainState, Outcome, Sweep};
+use crate::cook::interpolate::Followed;
 use crate::error::CookError;
-use crate::node::{ChainFns, FrameCx, Node, SavedFns, StateBox};
+use crate::geometry::Geometry;
+use crate::node::{ChainFns, Follows, FrameCx, Node, SavedFns, StateBox};
 use crate::plan::{ChainSegment, OutputFrames, Reads};
 use crate::time::Frame;
+
+/// The output of a window or solver at a whole frame.
+#[derive(Clone)]
+pub(super) struct Recent {
+    outcome: Outcome,
+    /// The input whose points it moves, at that frame.
+    followed: Option<Arc<Geometry>>,
+}
 
 /// A window or solver that is being cooked.
 #[derive(Clone, Copy)]
@@ -52,8 +62,10 @@ impl<'g> Sweep<'_, 'g, '_> {
                 state = Some((frame, arrived));
             }
             if let (Some(reads), Some((_, state))) = (output, &state) {
+                let followed =
+                    reads.as_ref().ok().and_then(|reads| self.followed(node, Frame::whole(frame), reads)?.ok());
                 let outcome = self.chain_output(node, frame, reads, state);
-                self.nodes[node.index].recent.insert(frame, outcome);
+                self.nodes[node.index].recent.insert(frame, Recent { outcome, followed });
             }
         }
         if let Some((at, state)) = state.filter(|(at, _)| at + 1 < segment.until) {
@@ -117,7 +129,7 @@ impl<'g> Sweep<'_, 'g, '_> {
     fn finish_chain(&mut self, node: ChainNode, frames: &BTreeSet<Frame>) {
         for frame in frames {
             let outcome = match self.plan.output_frames(*frame) {
-                OutputFrames::Whole(whole) => self.recent_output(node.index, whole),
+                OutputFrames::Whole(whole) => self.recent(node.index, whole).and_then(|recent| recent.outcome),
                 OutputFrames::Between(near, share) => self.output_between(node, *frame, near, share),
             };
             self.nodes[node.index].results.insert(*frame, outcome);
@@ -125,17 +137,39 @@ impl<'g> Sweep<'_, 'g, '_> {
     }
 
     fn output_between(&mut self, node: ChainNode, frame: Frame, near: [i64; 4], share: f32) -> Outcome {
-        let [a, b, c, d] = near.map(|whole| self.recent_output(node.index, whole));
-        let (a, b, c, d) = (a?, b?, c?, d?);
-        let between = self.executor.interpolated([&a, &b, &c, &d], share, node.declared.restore_between);
+        let [a, b, c, d] = near.map(|whole| self.recent(node.index, whole));
+        let near = [a?, b?, c?, d?];
+        let resolved = self.keys.resolve(node.index, frame)?;
+        let now = self.followed(node, frame, &resolved.reads).transpose()?;
+        let of_followed = near.each_ref().map(|recent| recent.followed.as_deref());
+        let followed = match (node.declared.follows, &now, of_followed) {
+            (Some(Follows { restore, .. }), Some(now), [Some(a), Some(b), Some(c), Some(d)]) => {
+                Some(Followed { now, near: [a, b, c, d], restore })
+            }
+            _ => None,
+        };
+        let [a, b, c, d] = near.each_ref().map(|recent| recent.outcome.as_ref().map_err(Arc::clone));
+        let between = self.executor.interpolated([a?, b?, c?, d?], share, followed);
         between.map_err(|error| Arc::new(self.plan.error(node.index, frame, error)))
     }
 
+    /// At a frame, the input whose points a window moves, where it declares one.
+    fn followed(
+        &self,
+        node: ChainNode,
+        frame: Frame,
+        reads: &Reads<'g>,
+    ) -> Option<Result<Arc<Geometry>, Arc<CookError>>> {
+        let follows = node.declared.follows?;
+        let input = reads.inputs.iter().find(|input| input.name == follows.input)?;
+        Some(self.geometry(self.plan.read(*input.links.first()?, frame)))
+    }
+
     /// The output at a whole frame; before the first state, that of its start.
-    fn recent_output(&mut self, node: usize, frame: i64) -> Outcome {
+    fn recent(&mut self, node: usize, frame: i64) -> Result<Recent, Arc<CookError>> {
         let segment = self.keys.segment(node, frame)?;
         let frame = frame.max(segment.start);
         let missing = || Err(self.not_cooked(node, Frame::whole(frame)));
-        self.nodes[node].recent.get(&frame).cloned().unwrap_or_else(missing)
+        self.nodes[node].recent.get(&frame).cloned().map_or_else(missing, Ok)
     }
 }

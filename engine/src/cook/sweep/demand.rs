@@ -105,6 +105,11 @@ impl<'g> Sweep<'_, 'g, '_> {
                     }
                 }
                 Some(Cook::Window(..) | Cook::Solver(..)) => {
+                    for frame in own.frames.iter().filter(|frame| !frame.is_whole()) {
+                        if let Ok(resolved) = self.keys.resolve(node, *frame) {
+                            self.demand_reads(&mut demand, &resolved.reads);
+                        }
+                    }
                     self.find_segments(node, &mut own);
                     self.demand_of_chain(&mut demand, node, &mut own.segments, lookahead);
                 }

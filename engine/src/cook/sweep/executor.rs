@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use crate::cook::call::{Call, Returned, check_finite};
-use crate::cook::interpolate::{between_files, interpolated};
+use crate::cook::interpolate::{Followed, between_files, interpolated};
 use crate::cook::store::{Cooked, Metrics};
 use crate::cook::types::completed;
 use crate::error::{Error, Result};
 use crate::geometry::Geometry;
-use crate::node::{ChainFns, FrameCx, Outputs, RestoreBetween, SavedFns, StateBox};
+use crate::node::{ChainFns, FrameCx, Outputs, SavedFns, StateBox};
 use crate::time::Frame;
 
 /// How a sweep carries out calls.
@@ -115,15 +115,10 @@ impl Executor {
     }
 
     /// The outputs of a window `share` of the way from `near[1]` to `near[2]`.
-    pub(super) fn interpolated(
-        self,
-        near: [&Cooked; 4],
-        share: f32,
-        restore: Option<RestoreBetween>,
-    ) -> Result<Cooked> {
+    pub(super) fn interpolated(self, near: [&Cooked; 4], share: f32, followed: Option<Followed<'_>>) -> Result<Cooked> {
         match self {
             Self::Rehearsal => Ok(near[1].clone()),
-            Self::Cook | Self::Check | Self::Types | Self::Reload => interpolated(near, share, restore),
+            Self::Cook | Self::Check | Self::Types | Self::Reload => interpolated(near, share, followed),
         }
     }
 }

@@ -34,6 +34,7 @@ use crate::node::StateBox;
 use crate::note::{Note, kind};
 use crate::plan::{ChainSegment, Integrals, Keys, Plan, Read};
 use crate::time::Frame;
+use chains::Recent;
 use demand::Lookahead;
 pub(super) use executor::Executor;
 use jumps::Jumps;
@@ -86,7 +87,7 @@ struct NodeRun<'p> {
     /// States of a window or solver, from which later slices go on.
     states: BTreeMap<ChainSegment, ChainState>,
     /// Outputs of a window or solver at the last whole frames, which samples between frames read again.
-    recent: BTreeMap<i64, Outcome>,
+    recent: BTreeMap<i64, Recent>,
     integrals: Option<Integrals<'p>>,
     on_disk: OnDisk,
     /// Mean wall time of a call in the last slice.

@@ -16,7 +16,7 @@ mod lengths;
 mod response;
 mod rigid_step;
 
-pub use lengths::with_lengths_between;
+pub use lengths::with_lengths_of;
 pub use response::{Drag, steps_to_forget};
 pub use rigid_step::RigidStep;
 

@@ -211,20 +211,18 @@ fn scaling_by_a_power_of_two_is_exact() {
 }
 
 #[test]
-fn lengths_are_interpolated_between_two_shapes() {
+fn segments_take_the_lengths_of_a_shape_and_keep_their_directions() {
     let starts = [0, 3, 3, 4];
-    let from = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [5.0; 3]];
-    let to = [[0.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 2.0, 1.0], [5.0; 3]];
-    let middle: Vec<Vec3> = from.iter().zip(&to).map(|(a, b)| std::array::from_fn(|k| 0.5 * (a[k] + b[k]))).collect();
-    let mut points = middle.clone();
-    with_lengths_between(&starts, [&from, &to], 0.5, &mut points);
-    // Directions of the middle, lengths 1.5 and 1.
+    let shape = [[0.0, 0.0, 0.0], [1.5, 0.0, 0.0], [1.5, 1.0, 0.0], [5.0; 3]];
+    let bent = [[0.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.5, 1.5, 0.5], [4.0; 3]];
+    let mut points = bent;
+    with_lengths_of(&shape, &starts, &mut points);
     assert!((distance(points[0], points[1]) - 1.5).abs() < 1e-6 && (distance(points[1], points[2]) - 1.0).abs() < 1e-6);
     assert!((points[1][1] / points[1][0] - 2.0).abs() < 1e-6);
-    assert_eq!([points[0], points[3]], [middle[0], middle[3]]);
-    let mut same = from;
-    with_lengths_between(&starts, [&from, &from], 0.3, &mut same);
-    assert_eq!(same, from);
+    assert_eq!([points[0], points[3]], [bent[0], bent[3]]);
+    let mut same = shape;
+    with_lengths_of(&shape, &starts, &mut same);
+    assert_eq!(same, shape);
 }
 
 #[test]
