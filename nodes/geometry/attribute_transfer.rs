@@ -2,10 +2,11 @@
 //!
 //! Each row takes the value of the nearest row of `source`, or, with a `radius`, the mean of those within it, with weights
 //! (1 − (d ÷ `radius`)²)². Points take from points, elements from elements: a curve is where its root is, a face or tet
-//! where the mean of its corners is. Of whole numbers, and of `orient`, there is no mean: the nearest counts. Where nothing
+//! where the mean of its corners is, but the nearest face is the one with the nearest point. Of whole numbers, and of `orient`, there is no mean: the nearest counts. Where nothing
 //! is within the radius a row keeps what it has; without the attribute it has its neutral value, such as an `envelope` of 1,
 //! or 0.
 
+use curves::attach::closest_triangles;
 use engine::geometry::ColumnType;
 use engine::prelude::*;
 use numerics::parallel::{self, CHUNK};
@@ -47,7 +48,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Attribute_Transfer",
-    2,
+    3,
     "Copies attributes from another geometry by position: masks painted on a mesh to the fur on it, or groups of a groom to \
      another one. Takes the nearest value, or a mean of those within `radius`.",
     Cook::Pure(cook),
@@ -90,7 +91,11 @@ fn cook(cx: &Cx) -> Result<Outputs> {
             if rows.is_empty() {
                 continue;
             }
-            let near = near(&tree, &rows, cx.get(RADIUS));
+            let radius = cx.get(RADIUS);
+            let near = match radius == 0.0 && owner == Owner::Element && part.kind() == Kind::Mesh {
+                true => nearest_faces(part, &rows),
+                false => near(&tree, &rows, radius),
+            };
             let missed = near.iter().filter(|near| near.is_empty()).count();
             unreached += missed;
             let before = own.table(owner).column(name);
@@ -138,6 +143,14 @@ fn places(part: &Component, owner: Owner) -> Vec<[f32; 3]> {
         (_, Kind::Tets) => part.tet_corners().iter().map(|corners| mean(corners)).collect(),
         _ => Vec::new(),
     }
+}
+
+/// The face that each place takes from.
+fn nearest_faces(mesh: &Component, places: &[[f32; 3]]) -> Vec<Vec<(u32, f64)>> {
+    let triangles = mesh.triangles();
+    let nearest = closest_triangles(mesh.positions(), &triangles.corners, places).unwrap_or_default();
+    let mut faces = nearest.into_iter().map(|triangle| triangles.faces[triangle as usize]);
+    places.iter().map(|_| faces.next().map(|face| (face, 1.0)).into_iter().collect()).collect()
 }
 
 /// The rows that each place takes from, nearest first, with their weights, which sum to 1.
@@ -285,8 +298,21 @@ mod tests {
         let bench = bench(&NODE).input(GEOMETRY, curves).input(SOURCE, mesh).set(ATTRIBUTES, names(&["patch"]));
         let out = bench.clone().set(FROM, From::Elements).cook();
         assert_eq!(out.curves().get(Attr::<i32>::element("patch")), Some(&[4, 5][..]));
-        let error = bench.try_cook().unwrap_err();
+        let error = bench.clone().try_cook().unwrap_err();
         assert_eq!(error.to_string(), "no points of `source` have the attribute `patch`; set `from` to what has it");
+    }
+
+    /// The root lies on a face ten long, nearer to the middle of the short one beside it.
+    #[test]
+    fn the_nearest_face_is_the_one_that_a_root_lies_on() {
+        let points = [0.0, 10.0, 10.2].map(|x| [[x, 0.0, 0.0], [x, 0.0, 1.0]]).as_flattened().to_vec();
+        let mut mesh = Component::mesh(vec![4, 4], vec![0, 1, 3, 2, 2, 3, 5, 4], points).unwrap();
+        mesh.set(Attr::<i32>::element("patch"), vec![1, 2]).unwrap();
+        let roots = [9.0, 10.1, -3.0].map(|x| [[x, 0.1, 0.5], [x, 1.0, 0.5]]).as_flattened().to_vec();
+        let curves = Component::curves(vec![2; 3], roots).unwrap();
+        let bench = bench(&NODE).input(GEOMETRY, curves).input(SOURCE, mesh).set(ATTRIBUTES, names(&["patch"]));
+        let out = bench.set(FROM, From::Elements).cook();
+        assert_eq!(out.curves().get(Attr::<i32>::element("patch")), Some(&[1, 2, 1][..]));
     }
 
     #[test]

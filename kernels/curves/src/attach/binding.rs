@@ -61,6 +61,24 @@ struct BoundVertex {
 /// No row.
 const NONE: u32 = u32::MAX;
 
+/// Of the triangles, rows of `points`, the one closest to each of `places`, of several the first; all in metres. `None` if
+/// there are places but no triangle with finite corners.
+///
+/// # Panics
+/// If a corner of `triangles` is out of range.
+pub fn closest_triangles(points: &[[f32; 3]], triangles: &[[u32; 3]], places: &[[f32; 3]]) -> Option<Vec<u32>> {
+    let found = closest(points, triangles, places)?;
+    Some(found.iter().map(|found| found.triangle).collect())
+}
+
+fn closest(points: &[[f32; 3]], triangles: &[[u32; 3]], places: &[[f32; 3]]) -> Option<Vec<SurfacePoint>> {
+    if places.is_empty() {
+        return Some(Vec::new());
+    }
+    let faces = ClosestFaces::new(points, triangles)?;
+    Some(parallel::concat(parallel::map(places.chunks(BOUND_AT_ONCE), |_, places| faces.find_each(places))))
+}
+
 impl SkinBinding {
     /// Binds `roots` to the closest points of `triangles`, rows of `points`; all in metres. `None` if there are roots
     /// but no triangle with finite corners. A root that is not finite is bound to the first triangle.
@@ -68,12 +86,7 @@ impl SkinBinding {
     /// # Panics
     /// If a corner of `triangles` is out of range.
     pub fn to_closest(points: &[[f32; 3]], triangles: &[[u32; 3]], roots: &[[f32; 3]]) -> Option<Self> {
-        if roots.is_empty() {
-            return Some(Self::new(points, triangles, &[], Vec::new()));
-        }
-        let faces = ClosestFaces::new(points, triangles)?;
-        let surface = parallel::map(roots.chunks(BOUND_AT_ONCE), |_, roots| faces.find_each(roots));
-        let surface = parallel::concat(surface);
+        let surface = closest(points, triangles, roots)?;
         Some(Self::new(points, triangles, &surface, roots.iter().map(|root| to_f64(*root)).collect()))
     }
 

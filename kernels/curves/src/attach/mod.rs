@@ -34,7 +34,7 @@ mod root_positions;
 mod rotation;
 mod triangle_lanes;
 
-pub use binding::SkinBinding;
+pub use binding::{SkinBinding, closest_triangles};
 pub use pose::{AttachedCurves, RootPose, attach_curves, rotate_orientations, rotate_vectors};
 pub(crate) use pose::{attach_curve, relative_stretch, rotate_orientation, tasks};
 pub use root_positions::RootPositions;
