@@ -21,6 +21,8 @@ pub mod kind {
     pub const OUTSIDE_SCENE: &str = "outside_scene";
     /// An output without any point or cell at all frames.
     pub const EMPTY_OUTPUT: &str = "empty_output";
+    /// Positions so far from the origin that single precision rounds shapes visibly.
+    pub const COARSE_POSITIONS: &str = "coarse_positions";
     /// A mask that is 0 everywhere, at all frames.
     pub const ZERO_MASK: &str = "zero_mask";
     /// A mask that takes a param out of its range.

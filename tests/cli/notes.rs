@@ -449,3 +449,19 @@ fn pieces_of_a_surface_that_get_no_tets_are_noted() {
         "{found:?}"
     );
 }
+
+/// At 131 km single precision steps by 1/128 m, 0.1 of a segment of 8 cm.
+#[test]
+fn shapes_that_single_precision_rounds_are_noted() {
+    let graph = r#"{"convect": 1, "scene": {"frames": [1, 2]}, "nodes": {
+        "fur": {"type": "Curve_In", "params": {"points": [[0, 0, 0], [0, 0.08, 0], [0, 0.16, 0]], "counts": [3]}},
+        "far": {"type": "Transform", "inputs": {"geometry": "fur"}, "params": {"translate": [131000, 0, 0]}}
+        }, "outputs": {"o": "far"}}"#;
+    let bench = Bench::with_graph(graph);
+    let expected = "note: output `o`: positions of its curves step by 0.00781 m, and its edges are 0.0800 m long on average. \
+                    So far from the origin single precision rounds their shape";
+    let found = bench.run(&["cook", "g.json", "--no-write"]).stderr;
+    assert!(found.contains(expected), "{found}");
+    bench.write("g.json", &graph.replace("131000", "13100"));
+    assert!(!bench.run(&["cook", "g.json", "--no-write"]).stderr.contains("note: output"));
+}

@@ -68,7 +68,7 @@ fn filled(
 }
 
 /// A number as a person reads it: whole, or with three digits.
-fn rounded(x: f64) -> String {
+pub(super) fn rounded(x: f64) -> String {
     let size = x.abs();
     if x.fract() == 0.0 && size < 1e15 {
         return format!("{x}");

@@ -4,6 +4,7 @@
 //! `nodes` and `chains` cook node by node, `retention` keeps what later slices read and drops the rest.
 
 mod chains;
+mod coarse;
 mod demand;
 mod executor;
 mod jumps;
@@ -230,6 +231,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         self.note_frames_outside();
         self.note_missing_attributes();
         self.note_empty_outputs();
+        self.note_coarse_positions();
         self.note_zero_masks();
         self.note_masks_outside();
         self.report_jumps();

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Sweep;
+use super::coarse::CoarsePositions;
 use crate::cook::{Delivered, warnings};
 use crate::expr::suggest::nearest;
 use crate::geometry::{Name, Owner, P, V};
@@ -23,6 +24,8 @@ pub(super) struct Observed {
     pub(super) unused: BTreeSet<Name>,
     /// By output: frames without geometry; `None` once there was one with geometry.
     empty: BTreeMap<usize, Option<Vec<Frame>>>,
+    /// By output: how coarse its positions were at the first frame with geometry, where that is too coarse.
+    pub(super) coarse: BTreeMap<usize, Option<CoarsePositions>>,
 }
 
 impl Observed {
@@ -37,6 +40,7 @@ impl Observed {
             missing: plan.request.outputs.iter().map(names).collect(),
             unused: BTreeSet::new(),
             empty: BTreeMap::new(),
+            coarse: BTreeMap::new(),
         }
     }
 
@@ -49,6 +53,9 @@ impl Observed {
             Some(frames) if is_empty => frames.push(*frame),
             _ if is_empty => {}
             empty => *empty = None,
+        }
+        if !is_empty {
+            self.coarse.entry(*output).or_insert_with(|| CoarsePositions::of(geometry, *frame));
         }
         let Some(missing) = self.missing.get_mut(&delivered.output).filter(|missing| !missing.is_empty()) else {
             return;
