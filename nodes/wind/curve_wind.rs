@@ -86,8 +86,8 @@ params! { PARAMS:
         "How fast the noise pattern moves downwind. 0 holds it still.")
         .unit(Unit::MetresPerSecond).soft(-10.0, 10.0).history().when(has_noise);
     LOOP: Param<f64> = Param::double("loop", 0.0,
-        "Number of frames after which the noise repeats, for a cycle that can be looped; keyed params must repeat too. \
-         The pattern cross-fades into itself, so it should move by the size of a feature or more in this time. 0 does \
+        "Number of frames after which the noise repeats, for a cycle that can be looped; keyed params must repeat too, \
+         also before the first frame if Curve_Jiggle's `preroll` reads it. The pattern cross-fades into itself, so it should move by the size of a feature or more in this time. 0 does \
          not loop.")
         .unit(Unit::Frames).within(0.0, 1e9).soft(0.0, 240.0).when(|params| has_noise(params) && params.get(SCROLL) != 0.0);
     NOISE_SPACE: Param<Space> = Param::choice("noise_space", Space::World,
