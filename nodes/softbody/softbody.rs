@@ -210,9 +210,15 @@ metrics! { METRICS:
          350 Newton iterations or more.")
         .warn_above(0.0, "So much is in contact that there is no time for bounces at these frames: bodies lose more speed \
             than their material would. Set `substeps` to pay for them, or `bounce` to 0 if they need not bounce.");
-    VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume relative to the rest volume.")
+    VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume of the tets relative to that at rest.")
         .warn_outside(0.9, 1.1, "The bodies lose or gain more than a tenth of their volume. Raise `volume`, or \
             `stiffness`; look for colliders that squeeze them into too small a space.");
+    CARRIED_VOLUME_RATIO = Metric::new("carried_volume_ratio", Unit::None,
+        "Volume that a mesh that rides along encloses, relative to that at rest; of the one for which it differs most from 1. 1 if \
+         no closed mesh rides along.")
+        .warn_outside(0.9, 1.1, "A mesh that rides along loses or gains more than a tenth of its volume, although the tets of its cage keep \
+            theirs: they are too coarse for it, and bend through it. Lower `spacing` of Tetrahedralize, or use `method` `delaunay` if \
+            the mesh allows it.");
     WORST_STRETCH = Metric::new("worst_stretch", Unit::None,
         "The largest stretch or compression of a spring: length ÷ rest length, or rest length ÷ length.");
     INVERTED_TETS = Metric::new("inverted_tets", Unit::None, "Tets that are inside out.")

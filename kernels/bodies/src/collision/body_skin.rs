@@ -106,6 +106,25 @@ impl BodySkin {
         self.rest.len()
     }
 
+    /// The volume that a surface that rides along encloses with contact points at `x`, relative to that at rest; `None` if it
+    /// does not ride, is open, or encloses nothing.
+    pub fn carried_volume_ratio(&self, x: &[[f64; 3]]) -> Option<f64> {
+        let surface = &self.surface;
+        let rides = surface.vertices.first().is_some_and(|vertex| self.rides(*vertex));
+        let is_closed = surface.edges.iter().all(|edge| edge.faces.iter().all(|face| *face != NONE));
+        let volume = |x: &[[f64; 3]]| -> f64 {
+            // Relative to a point of it, so that far from the origin nothing is lost.
+            let origin = DVec3::from(surface.triangles.first().map_or([0.0; 3], |corners| x[corners[0] as usize]));
+            let cone = |corners: &[u32; 3]| {
+                let [a, b, c] = corners.map(|corner| DVec3::from(x[corner as usize]) - origin);
+                a.dot(&b.cross(&c))
+            };
+            surface.triangles.iter().map(cone).sum()
+        };
+        let rest = (rides && is_closed).then(|| volume(&self.rest)).filter(|rest| *rest != 0.0)?;
+        Some(volume(x) / rest)
+    }
+
     /// Whether a contact point rides along on particles.
     pub(super) fn rides(&self, point: u32) -> bool {
         point as usize >= self.particles

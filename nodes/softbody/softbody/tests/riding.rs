@@ -49,6 +49,25 @@ fn a_caged_ball_rests_on_the_ball_and_not_on_its_cage() {
     assert!(frames[2].metrics["kinetic"] < 1e-6, "{:?}", frames[2].metrics);
 }
 
+/// Of a soft ball the mesh loses what its tets keep; the metric is that of the mesh, by the divergence theorem.
+#[test]
+fn the_volume_of_the_mesh_that_rides_along_is_measured() {
+    let volume = |mesh: &Component| -> f64 {
+        let cone = |[a, b, c]: &[u32; 3]| {
+            let [a, b, c] = [a, b, c].map(|corner| to_f64(mesh.positions()[*corner as usize]));
+            a.dot(&b.cross(&c)) / 6.0
+        };
+        mesh.triangles().corners.iter().map(cone).sum()
+    };
+    let soft = falling(caged_ball([0.0, 0.11, 0.0])).set(STIFFNESS, 2e3.into()).set(GROUND, true).frames([1, 24]);
+    let ratio = volume(soft[1].mesh()) / volume(soft[0].mesh());
+    let metric = soft[1].metrics["carried_volume_ratio"];
+    assert!((metric - ratio).abs() < 1e-5 && (0.5..0.97).contains(&ratio), "{metric} for {ratio}");
+    assert!((soft[0].metrics["carried_volume_ratio"] - 1.0).abs() < 1e-6);
+    let block = falling(block([2; 3], [0.0, 0.11, 0.0], [0.1; 3]).into()).frames([1]);
+    assert_eq!(block[0].metrics["carried_volume_ratio"], 1.0, "nothing rides along");
+}
+
 /// The upper ball is on the axis of the lower.
 #[test]
 fn a_caged_ball_on_another_touches_the_ball() {
