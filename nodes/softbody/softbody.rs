@@ -59,8 +59,8 @@ inputs! { INPUTS:
         "Bodies from Tetrahedralize, in their initial positions. A surface mesh that comes with the tets is carried \
          along by them and makes the contacts; without one, the boundary of the tets is the surface.").read_at(|_| Times::START);
     COLLIDERS: Input<Many> = Input::many("colliders", Kind::Mesh,
-        "Meshes that bodies collide with: hands, rolling pins, bowls. They may move, rotate and deform; numbered files \
-         move evenly from frame to frame.")
+        "Meshes that bodies collide with: hands, rolling pins, bowls. They may move, rotate and deform. The faces of a \
+         closed one face outwards; inwards they make a room.")
         .read_at(|_| Times::within_step(COLLIDER_SAMPLES));
     GOALS: Input<Many> = Input::many("goals", Kind::Tets,
         "Target shapes from Softbody_Goal. A body moves from one goal to the next and reaches each at the frame set \
