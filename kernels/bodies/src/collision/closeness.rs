@@ -36,25 +36,17 @@ pub(super) struct Yielding {
 }
 
 impl Yielding {
-    /// A contact that lets surfaces be closer by that, unless there is no room for it.
+    /// A contact that lets surfaces be closer by that, unless there is no room for it. Open obstacles must not be passed: there
+    /// the distance to keep is smaller.
     pub(super) fn of(self, contact: Contact) -> Contact {
         if contact.jammed || (self.by == 0.0 && self.speed == 0.0) {
             return contact;
         }
-        Contact { offset: contact.offset - self.by, velocity: self.receding(&contact), ..contact }
-    }
-
-    /// The same with an obstacle that must not be passed: its distance is smaller.
-    pub(super) fn of_open(self, contact: Contact) -> Contact {
-        if contact.jammed || (self.by == 0.0 && self.speed == 0.0) {
-            return contact;
+        let velocity = (DVec3::from(contact.velocity) + DVec3::from(contact.normal) * self.speed).into();
+        if contact.open {
+            return Contact { gap: (contact.gap - self.by).max(LEAST * contact.gap), velocity, ..contact };
         }
-        let gap = (contact.gap - self.by).max(LEAST * contact.gap);
-        Contact { gap, velocity: self.receding(&contact), ..contact }
-    }
-
-    fn receding(self, contact: &Contact) -> [f64; 3] {
-        (DVec3::from(contact.velocity) + DVec3::from(contact.normal) * self.speed).into()
+        Contact { offset: contact.offset - self.by, velocity, ..contact }
     }
 }
 
@@ -94,8 +86,7 @@ impl CollisionScene<'_> {
         for (index, skin) in self.skins.iter().enumerate() {
             skin.touching.iter().for_each(|point| skin_of[*point as usize] = index);
         }
-        let bare = CollisionScene { ground: None, obstacles: &[], body_contact: None, self_contact: None, ..*self };
-        let bare = CollisionScene { separation: None, caught: &[], ..bare };
+        let bare = CollisionScene { skins: self.skins, ..CollisionScene::default() };
         let mut found: Vec<Closeness> = Vec::new();
         let mut add = |scene: CollisionScene<'_>, of: Option<OverlapPartner>| {
             let mut contacts = Vec::new();

@@ -411,7 +411,7 @@ impl SkinObstaclePair<'_> {
         let [raised, raised_end] = touched.map(|touched| self.scene.raised(touched, normal, gap));
         let seconds = self.obstacle.seconds * (times[1] - times[0]);
         let stopping = if seconds > 0.0 { (raised_end - raised) / seconds } else { DVec3::zeros() };
-        let contact = Contact {
+        self.yielding.of(Contact {
             points: own,
             weights,
             normal: normal.into(),
@@ -421,8 +421,7 @@ impl SkinObstaclePair<'_> {
             friction: self.obstacle.friction * self.scene.friction_scale(&own, &weights),
             jammed: -normal.dot(&raised_end) > JAMMED * gap,
             open: !self.obstacle.surface.closed,
-        };
-        if self.obstacle.surface.closed { self.yielding.of(contact) } else { self.yielding.of_open(contact) }
+        })
     }
 }
 

@@ -79,8 +79,7 @@ impl StageSolver {
             let now = self.square(stage);
             if solved.newton == 0 {
                 solved.first = if before.first > 0.0 { before.first } else { now };
-                let contacts = self.contact_objective(stage, x);
-                base = ObjectiveParts { contacts, others: self.other_objective(stage, x) };
+                base = self.objective(stage, x);
                 solved.enough = before.enough.max(SHARE * SHARE * now.min(scale));
             }
             solved.set_residual(now);
@@ -149,7 +148,7 @@ impl StageSolver {
     fn correct_angular_momentum_downhill(&mut self, stage: &Stage<'_>, base: f64, x: &mut [DVec3]) -> bool {
         let turned = self.corrected_angular_momentum(stage, x);
         let Some(turned) = turned.filter(|turned| turned != x) else { return false };
-        let level = self.contact_objective(stage, &turned) + self.other_objective(stage, &turned);
+        let level = self.objective(stage, &turned).sum();
         self.measured = level <= base + ROUNDING * base.abs();
         if self.measured {
             x.copy_from_slice(&turned);
@@ -158,6 +157,11 @@ impl StageSolver {
         }
         velocities(stage, x, &mut self.v);
         false
+    }
+
+    /// The objective at `x`; sets the velocities to those at `x`.
+    fn objective(&mut self, stage: &Stage<'_>, x: &[DVec3]) -> ObjectiveParts {
+        ObjectiveParts { contacts: self.contact_objective(stage, x), others: self.other_objective(stage, x) }
     }
 
     /// The objective ½(x − y)ᵀM(x − y) + a²·(potentials) without contacts, at positions for which
