@@ -27,6 +27,7 @@ static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 const ROUNDS: usize = 7;
 
 fn main() {
+    convect::allocator::keep_freed_pages();
     let mut figures = Figures::default();
     let engine = Engine::new(&Settings::default()).expect("threads");
     timing::print_machine(&engine);

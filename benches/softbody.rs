@@ -173,6 +173,7 @@ impl Case {
 }
 
 fn main() {
+    convect::allocator::keep_freed_pages();
     let words: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with("--")).collect();
     if let [peak, size, scene] = &words[..]
         && peak == PEAK

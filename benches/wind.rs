@@ -65,6 +65,7 @@ enum Fur {
 }
 
 fn main() {
+    convect::allocator::keep_freed_pages();
     let two = Engine::new(&Settings { threads: 2, ..Settings::default() }).expect("threads");
     let one = Engine::new(&Settings { threads: 1, ..Settings::default() }).expect("threads");
     timing::print_machine(&two);

@@ -12,6 +12,7 @@ macro_rules! say {
     }};
 }
 
+pub mod allocator;
 pub mod args;
 pub mod check;
 pub mod completions;

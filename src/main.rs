@@ -4,12 +4,13 @@ use std::io::Write as _;
 use std::process::ExitCode;
 
 use clap::Parser;
+use convect::allocator::keep_freed_pages;
 use convect::failure::{Exit, Failure, too_large_files_are_errors};
 use convect::say;
 use convect::{check, completions, convert, cook, diff, explain, functions, job, merge, nodes, schema, stats, study};
 
-/// Keeps the pages of large arrays between frames. The system's allocator returns them at once, and requesting them
-/// again costs a third of the time of a frame of a million curves.
+/// Keeps the pages of large arrays between frames, as [`keep_freed_pages`] says. The system's allocator returns them at once, and
+/// requesting them again costs a third of the time of a frame of a million curves.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
@@ -46,6 +47,7 @@ enum Verb {
 }
 
 fn main() -> ExitCode {
+    keep_freed_pages();
     quiet_panics();
     too_large_files_are_errors();
     let verb = match Verb::try_parse() {

@@ -55,6 +55,7 @@ const PARTS: [(&str, Measure); 8] = [
 ];
 
 fn main() -> ExitCode {
+    convect::allocator::keep_freed_pages();
     let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
     if let [child, case] = &words[..]
         && child == frames::CHILD
