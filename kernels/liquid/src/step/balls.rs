@@ -114,6 +114,7 @@ impl<S: Surface> Liquid<S> {
         images.fill(&mut known);
         images.fill_each(&mut faces);
         if let Some(gain) = &mut self.motion.gain {
+            gain.changed = gain.changed.take().map(|faces| resampled(&rows, self.motion.velocity.rows(), &faces));
             let gained: FaceFields<f32> = resampled(&rows, self.motion.velocity.rows(), &gain.faces);
             gain.faces = gained;
         }

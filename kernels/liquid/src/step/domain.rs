@@ -70,6 +70,11 @@ pub(crate) struct Obstacle<'a> {
 }
 
 impl Obstacle<'_> {
+    /// The same, were it not moving.
+    pub(super) fn stopped(self) -> Self {
+        Self { solid: Solid::still(self.solid.distance), time: self.time }
+    }
+
     pub(crate) fn distance(&self, point: Vec3) -> f32 {
         (self.solid.distance)(self.time, point)
     }

@@ -33,6 +33,7 @@
 mod balls;
 mod domain;
 mod exchange;
+mod first;
 mod flight;
 mod force;
 mod fullness;
@@ -325,9 +326,11 @@ impl<S: Surface> Liquid<S> {
             left = seconds - BEGINNING * seconds;
             let next_seconds = self.plan(around, [seconds - left, seconds], self.settings.max_substeps).step;
             let span = Span { times: [0.0, seconds - left], next_seconds, ends_frame: false };
+            // Unless it was at rest: what moves then does so by what began.
+            let is_new = self.motion.is_new && self.motion.largest_speed() > 0.0;
             report.add(&self.substep(around, span, seconds));
             // What begins at once is no acceleration that goes on.
-            self.motion.gain = None;
+            (self.motion.gain, self.motion.is_new) = (None, is_new);
         }
         while left > 0.0 && !(around.cancelled)() {
             let allowed = self.settings.max_substeps.saturating_sub(report.substeps - beginnings);

@@ -8,7 +8,7 @@ use crate::level_set::PhiView;
 use crate::pressure::LEAST_DEPTH;
 use crate::rows::{Cell, CellRows, Finder, Images};
 use crate::step::domain::{Domain, Obstacle};
-use crate::step::flight::flying;
+use crate::step::flight::Flight;
 use crate::step::outflow::Outflow;
 use crate::step::sources::FlowAccount;
 use crate::step::substep::most_layers;
@@ -16,13 +16,16 @@ use crate::step::{LiquidSettings, Moving, Surface, Surroundings, Wall};
 use crate::velocity::{ALL_FACES, FaceFields, FaceMask, MacVelocity, Sampler, Site, extrapolate_first, resampled};
 
 /// Layers past the liquid in which what is carried has values of its own: the faces of the next substep come from there.
-const OWN_LAYERS: u32 = 3;
+pub(super) const OWN_LAYERS: u32 = 3;
 
 /// What gravity and pressure together added to the velocity in a substep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Gain {
     /// On the rows of the velocity, m/s.
     pub faces: FaceFields<f32>,
+    /// What the velocity of the faces that fly steadily changed by at their places, besides what gravity added, m/s; none where
+    /// nothing flew before.
+    pub changed: Option<FaceFields<f32>>,
     /// The length of that substep, s.
     pub seconds: f64,
 }
@@ -42,7 +45,11 @@ pub struct Motion {
     pub(super) known: Vec<FaceMask>,
     /// The faces of pieces that touch nothing; empty where there are none.
     pub(super) flying: Vec<FaceMask>,
+    /// Whether one of these pieces is large enough to show how it is accelerated.
+    pub(super) flies_shown: bool,
     pub(super) gain: Option<Gain>,
+    /// Whether the velocity was set, and there was no substep since.
+    pub(super) is_new: bool,
     pub(super) guess: Guess,
     pub(super) liquid_cells: usize,
     /// What each source has given, and what it owes.
@@ -74,9 +81,11 @@ impl Motion {
                 [0, 1, 2].map(|axis| if open(axis) { value(axis, cell) } else { 0.0 })
             },
         );
-        let (liquid_cells, flying) = (cells.liquid.len(), flying(&cells, &settings.domain));
+        let (liquid_cells, flight) = (cells.liquid.len(), Flight::of(&cells, &settings.domain, &[]));
+        let (flying, flies_shown) = (flight.faces, flight.is_shown);
         let known = cells.known;
-        Self { velocity: MacVelocity::new(cells.rows, faces), known, flying, liquid_cells, ..Self::default() }
+        let velocity = MacVelocity::new(cells.rows, faces);
+        Self { velocity, known, flying, flies_shown, is_new: true, liquid_cells, ..Self::default() }
     }
 
     /// The cells that the velocity is stored for.
@@ -156,7 +165,7 @@ impl Motion {
     /// The velocity, m/s, continued `layers` cells past the liquid, but no farther than a substep follows it.
     pub fn velocity_past_liquid(&self, domain: &Domain, layers: i32) -> MacVelocity {
         let rows = self.rows_past_liquid(domain, layers.min(most_layers()));
-        let [faces] = self.continued([self.velocity.faces()], &rows, f32::INFINITY, domain, None);
+        let [faces] = self.continued([self.velocity.faces()], &rows, (f32::INFINITY, OWN_LAYERS), domain, None);
         MacVelocity::new(rows, faces)
     }
 
@@ -175,13 +184,13 @@ impl Motion {
         std::array::from_fn(|axis| faces[axis].iter().zip(&gained[axis]).map(|(u, gain)| u + ratio * gain).collect())
     }
 
-    /// Fields that are known where the velocity is, continued to all of `rows`; beyond [`OWN_LAYERS`] all are as the first is.
-    /// `steepest`: see [`extrapolate_first`].
+    /// Fields that are known where the velocity is, continued to all of `rows`; `steepest`, and how many layers past
+    /// the liquid are of each field's own: see [`extrapolate_first`].
     pub(super) fn continued<const F: usize>(
         &self,
         fields: [&FaceFields<f32>; F],
         rows: &CellRows,
-        steepest: f32,
+        (steepest, own_layers): (f32, u32),
         domain: &Domain,
         solid: Option<Obstacle<'_>>,
     ) -> [FaceFields<f32>; F] {
@@ -190,7 +199,7 @@ impl Motion {
         let mut fields = fields.map(|faces| resampled(rows, self.rows(), faces));
         images.fill(&mut known);
         fields.iter_mut().for_each(|faces| images.fill_each(faces));
-        extrapolate_first(rows, &mut known, fields.each_mut(), steepest, [OWN_LAYERS, u32::MAX]);
+        extrapolate_first(rows, &mut known, fields.each_mut(), steepest, [own_layers, u32::MAX]);
         fields.map(|mut faces| {
             images.fill_each(&mut faces);
             hold_walls(domain, rows, &mut faces);

@@ -6,14 +6,15 @@ use crate::level_set::{Distance, Held, PhiChange, PhiView, far_from_surface, hel
 use crate::rows::{Cell, Periods};
 use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
-use crate::step::flight::flying;
-use crate::step::motion::{Gain, LiquidCells, Motion, largest_of};
+use crate::step::first::begin;
+use crate::step::flight::Flight;
+use crate::step::motion::{Gain, LiquidCells, Motion, OWN_LAYERS, largest_of};
 use crate::step::outflow::outflow;
 use crate::step::project::{Materials, Projection};
 use crate::step::sources::{LiquidSink, LiquidSource, Span};
 use crate::step::turned;
 use crate::step::{LiquidReport, LiquidSettings, Splitting};
-use crate::velocity::{Advection, Around, FaceFields, MacVelocity, Sampler};
+use crate::velocity::{Advection, Around, FaceFields, MacVelocity, Sampler, resampled};
 
 /// What is around a liquid.
 #[derive(Clone, Copy)]
@@ -113,11 +114,11 @@ impl<'a> Moving<'a> {
 
 /// Differences of velocity between neighbouring faces that are continued, in cells a substep: a flow that changes faster
 /// would turn its cells over.
-const STEEPEST: f32 = 0.25;
+pub(super) const STEEPEST: f32 = 0.25;
 
 /// Cells that liquid is followed over in a substep, at most, so that a substep takes a bounded time: what moves farther ends
 /// anywhere.
-const FARTHEST: f32 = 64.0;
+pub(super) const FARTHEST: f32 = 64.0;
 
 /// Cells that a solid moves in a substep, at most, for liquid to notice it on its way.
 const FASTEST: f32 = 2.5;
@@ -147,10 +148,9 @@ pub(super) fn substep(
     let solid = around.solid.map(|solid| solid.at(middle));
     let step = (seconds / settings.cell) as f32;
     let gravity = (around.gravity)(middle).map(|g| g * seconds);
-    let in_flight = motion.in_flight(gravity);
-    let way = in_flight.as_ref().map_or_else(|| motion.largest_speed(), largest_of) as f32 * step;
-    let reach = way.min(FARTHEST);
-    let (velocity, carried) = continued(&settings.domain, motion, in_flight, solid, seconds, [step, reach]);
+    let first = begin(settings, surface, motion, around, span);
+    let moving = continued(&settings.domain, motion, gravity, solid, seconds, step);
+    let Continued { velocity, carried, before: flown, way, reach } = moving;
     let periods = settings.domain.periods();
     let flow = Moving { velocity: &velocity, step, periods, solid };
     let outflow = outflow(&settings.domain, surface.view(), &flow, solid, settings.cell_volume());
@@ -172,6 +172,7 @@ pub(super) fn substep(
     let mut faces = advection.carry(carried.as_ref().unwrap_or(velocity.faces()), &cells.rows, &cells.moving);
     exchanged.enter_far(velocity.rows(), &cells, &mut faces);
     let stored_cells = velocity.rows().len();
+    let flown = flown.map(|before| resampled(&cells.rows, velocity.rows(), &before));
     drop((velocity, carried));
     Imposed::set(&imposed, &cells.rows, &mut faces, |velocity| velocity);
     cells.images.fill_each(&mut faces);
@@ -193,47 +194,81 @@ pub(super) fn substep(
     cells.images.fill_each(&mut faces);
     report.substeps = 1;
     report.cfl_reached = f64::from(way);
+    first.count(&mut report);
     report.stored_cells = stored_cells;
     report.liquid_cells = cells.liquid.len();
     report.left_domain = left_domain;
     motion.gain = (settings.splitting == Splitting::KeepsSpin).then(|| {
         let gained =
             |axis: usize| faces[axis].iter().zip(&before[axis]).map(|(after, before)| after - before).collect();
-        Gain { faces: [gained(0), gained(1), gained(2)], seconds }
+        Gain { faces: [gained(0), gained(1), gained(2)], changed: None, seconds }
     });
     motion.liquid_cells = cells.liquid.len();
-    motion.flying = flying(&cells, &settings.domain);
+    let held_before = if flown.is_some() { motion.held_on(&cells.rows) } else { Vec::new() };
+    let flight = Flight::of(&cells, &settings.domain, &held_before);
+    (motion.flying, motion.flies_shown) = (flight.faces, flight.is_shown);
     motion.known = cells.known;
     motion.velocity = MacVelocity::new(cells.rows, faces);
+    if let Some(before) = flown.filter(|_| !motion.flying.is_empty()) {
+        let changed = Some(motion.changed(&before, &flight.steady, gravity));
+        motion.gain = motion.gain.take().map(|gain| Gain { changed, ..gain });
+    }
     report
 }
 
-/// The velocity with which the surface moves, continued past the liquid, and what is carried in its place where that is
-/// another. `in_flight`: see [`Motion::in_flight`]; `step`: cells moved at 1 m/s, and by the fastest liquid.
+/// A velocity continued past the liquid.
+struct Continued {
+    /// That with which the surface moves.
+    velocity: MacVelocity,
+    /// What is carried in its place, where that is another, on its rows.
+    carried: Option<FaceFields<f32>>,
+    /// The velocity itself, on the same rows, where something flies that shows how it is accelerated.
+    before: Option<FaceFields<f32>>,
+    /// Cells that the fastest liquid moves, and how far it is followed.
+    way: f32,
+    reach: f32,
+}
+
+/// How the liquid moves in a substep in which gravity adds `gravity`, m/s. `step`: cells moved at 1 m/s.
 fn continued(
     domain: &Domain,
     motion: &Motion,
-    in_flight: Option<FaceFields<f32>>,
+    gravity: [f64; 3],
     solid: Option<Obstacle<'_>>,
     seconds: f64,
-    [step, reach]: [f32; 2],
-) -> (MacVelocity, Option<FaceFields<f32>>) {
-    let steepest = STEEPEST / step;
-    let rows = motion.rows_past_liquid(domain, layers(reach));
+    step: f32,
+) -> Continued {
+    let (steepest, periods) = (STEEPEST / step, domain.periods());
     let own = motion.velocity.faces();
+    let in_flight = motion.in_flight(gravity, seconds, step);
+    let way = in_flight.as_ref().map_or_else(|| motion.largest_speed(), largest_of) as f32 * step;
+    let reach = way.min(FARTHEST);
+    let rows = motion.rows_past_liquid(domain, layers(reach));
     let carried = match &motion.gain {
-        Some(gain) => Some(turned::carried(motion, gain, domain.periods(), seconds, step, steepest)),
+        Some(gain) => Some(turned::carried(motion, gain, periods, seconds, [step, steepest])),
         None => in_flight.is_some().then(|| own.clone()),
     };
-    let moving = in_flight.as_ref().unwrap_or(own);
-    match carried {
+    let mut continued = Continued { velocity: MacVelocity::default(), carried: None, before: None, way, reach };
+    let mean = in_flight.as_ref().unwrap_or(own);
+    let velocity = match carried {
+        Some(carried) if motion.flies_shown => {
+            // As far as the liquid comes.
+            let limits = (steepest, OWN_LAYERS.max(reach as u32 + 2));
+            let [velocity, carried, before] = motion.continued([mean, &carried, own], &rows, limits, domain, solid);
+            (continued.carried, continued.before) = (Some(carried), Some(before));
+            velocity
+        }
         Some(carried) => {
-            let [velocity, carried] = motion.continued([moving, &carried], &rows, steepest, domain, solid);
-            (MacVelocity::new(rows, velocity), Some(carried))
+            let limits = (steepest, OWN_LAYERS);
+            let [velocity, carried] = motion.continued([mean, &carried], &rows, limits, domain, solid);
+            continued.carried = Some(carried);
+            velocity
         }
         None => {
-            let [velocity] = motion.continued([moving], &rows, steepest, domain, solid);
-            (MacVelocity::new(rows, velocity), None)
+            let [velocity] = motion.continued([mean], &rows, (steepest, OWN_LAYERS), domain, solid);
+            velocity
         }
-    }
+    };
+    continued.velocity = MacVelocity::new(rows, velocity);
+    continued
 }

@@ -4,6 +4,7 @@ mod balls;
 mod dam;
 mod decoupled;
 mod force;
+mod free_spin;
 mod leaks;
 mod materials;
 mod outflow;
