@@ -15,7 +15,7 @@
 use curves::attach::{RootPose, RootPositions, SkinBinding, rotate_orientations, rotate_vectors};
 use curves::collide::{Clearance, KeepOut, KeptOut, keep_out};
 use curves::deform::{
-    CurveDeform, DeformedCurves, GuideTurns, carried_poses, deform_curves, guide_poses, segment_middles,
+    CurveDeform, DeformedCurves, GuideSegments, GuideTurns, carried_poses, deform_curves, guide_poses, segment_middles,
 };
 use curves::guides::{GuideWeights, MAX_GUIDES, OrientedPoint, guide_weights};
 use engine::prelude::*;
@@ -82,7 +82,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Deform",
-    3,
+    4,
     "Lets an existing groom follow guide curves, so that only a few hundred guides need to be simulated. Each curve \
      turns as the guides nearest to its root have turned since rest, and keeps its own shape, length and attributes. If \
      `skin` is wired, curves are kept out of it.",
@@ -135,8 +135,20 @@ fn cook(cx: &Cx) -> Result<Outputs> {
             }
             None => Arc::new(OnSkin::without(&bound, curves, rest_guides, guides)),
         };
+        let skin = keeps_out.map(|(_, mesh)| skin(mesh));
+        let keep_out_of = skin.as_ref().map(|skin| KeepOut {
+            skin: skin.surface(),
+            rest: curves.positions(),
+            poses: on_skin.hairs(),
+            gap: GAP * bound.mean_length,
+            clearance: &on_skin.clearance,
+        });
+        let starts = curves.runs().starts();
+        if let Some(how) = &keep_out_of {
+            how.prepare(starts);
+        }
         let deformed = match moves {
-            true => deformed(cx, &bound, &on_skin, [rest_guides, guides])?,
+            true => deformed(cx, &bound, &on_skin, [rest_guides, guides], keep_out_of.as_ref())?,
             false => DeformedCurves { points: curves.positions().to_vec(), ..DeformedCurves::default() },
         };
         length_error = deformed.length_error;
@@ -144,16 +156,8 @@ fn cook(cx: &Cx) -> Result<Outputs> {
             off_skin = roots_off(rest_guides, guides, poses);
         }
         let mut points = deformed.points;
-        if let Some((_, mesh)) = keeps_out {
-            let skin = skin(mesh);
-            let how = KeepOut {
-                skin: skin.surface(),
-                rest: curves.positions(),
-                poses: on_skin.hairs(),
-                gap: GAP * bound.mean_length,
-                clearance: &on_skin.clearance,
-            };
-            kept = keep_out(curves.runs().starts(), &mut points, &how);
+        if let Some(how) = &keep_out_of {
+            kept = keep_out(starts, &mut points, how, &deformed.clear);
         }
         if moves || kept.kept_out > 0 {
             out.set(P, points)?;
@@ -203,15 +207,23 @@ fn count(curves: &Component) -> String {
 }
 
 /// The groom deformed, before it is kept out of the skin.
-fn deformed(cx: &Cx, bound: &Bound, on_skin: &OnSkin, [rest, now]: [&Component; 2]) -> Result<DeformedCurves> {
+fn deformed(
+    cx: &Cx,
+    bound: &Bound,
+    on_skin: &OnSkin,
+    [rest, now]: [&Component; 2],
+    keep_out: Option<&KeepOut<'_>>,
+) -> Result<DeformedCurves> {
     let curves = cx.part(CURVES);
-    let turns = GuideTurns::new(rest.runs().starts(), rest.positions(), now.positions(), on_skin.guides());
+    let positions = [rest.positions(), now.positions()];
+    let turns = GuideTurns::new(&bound.segments, rest.runs().starts(), positions, on_skin.guides());
     let how = CurveDeform {
         weights: &bound.weights,
         middles: &bound.middles,
         turns: &turns,
         poses: on_skin.hairs(),
         blend: cx.mask(BLEND, curves)?,
+        keep_out,
     };
     let turned = |name: &str| curves.columns().any(|(owner, column, _)| owner == Owner::Point && **column == *name);
     let with_rotations = [V.name, N.name, ORIENT.name].into_iter().any(turned);
@@ -274,6 +286,8 @@ struct Bound {
     weights: GuideWeights,
     /// Of each segment, along its curve.
     middles: Vec<f64>,
+    /// Of the guides.
+    segments: GuideSegments,
     /// Of the curves, metres.
     mean_length: f64,
     /// Roots of curves and of guides on the skin at rest.
@@ -314,6 +328,7 @@ impl Bound {
             unguided: (0..curves.element_count()).filter(unguided).count(),
             weights,
             middles: segment_middles(curves.runs().starts(), curves.positions()),
+            segments: GuideSegments::of(guides.runs().starts(), guides.positions()),
             mean_length: mean_length(curves),
             far_roots: on_skin.as_ref().map_or(0, |(hairs, posts)| far(hairs, curves) + far(posts, guides)),
             on_skin,

@@ -18,8 +18,8 @@ use super::kept_half_spaces::KeptHalfSpaces;
 use super::segment_turn::{Nearby, gather};
 use super::{Collide, ContactMethod, SkinSurface, collide};
 use crate::attach::{RootPose, attach_curve, relative_stretch};
-use clear_lanes::ClearLanes;
-use numerics::lanes::LANES;
+pub(crate) use clear_lanes::ClearLanes;
+use numerics::lanes::{F32x16, LANES, Lanes, set};
 use numerics::masked::Masked;
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
@@ -82,22 +82,38 @@ pub struct KeptOut {
 }
 
 /// Replaces each of the curves `points[starts[i]..starts[i + 1]]` that crosses the skin by one that turned towards it
-/// from rest until it met the skin.
+/// from rest until it met the skin. Those that are known to be clear (see [`KeepOut::prepare`]) are not tested; an empty
+/// slice if that has not been found out.
 ///
 /// # Panics
 /// If `starts` does not run up to the number of points, of `points` and of the rest shapes, or if there are more curves than
-/// in [`Clearance::of`].
-pub fn keep_out(starts: &[u32], points: &mut [Vec3], how: &KeepOut<'_>) -> KeptOut {
-    keep_out_on(Path::chosen(), starts, points, how)
+/// in [`Clearance::of`] or `clear`.
+pub fn keep_out(starts: &[u32], points: &mut [Vec3], how: &KeepOut<'_>, clear: &[bool]) -> KeptOut {
+    keep_out_on(Path::chosen(), starts, points, how, clear)
 }
 
 /// [`keep_out`] on a given SIMD path.
-pub(super) fn keep_out_on(path: Path, starts: &[u32], points: &mut [Vec3], how: &KeepOut<'_>) -> KeptOut {
+pub(super) fn keep_out_on(
+    path: Path,
+    starts: &[u32],
+    points: &mut [Vec3],
+    how: &KeepOut<'_>,
+    clear: &[bool],
+) -> KeptOut {
     let curves = starts.len().saturating_sub(1);
     let half_spaces = &how.clearance.half_spaces;
-    half_spaces.used(|curves, found| look_up(path, curves, starts, how, found));
     let tasks = (0..curves).step_by(TASK_CURVES).map(|first| first..curves.min(first + TASK_CURVES));
-    let entered = parallel::map(tasks, |_, curves| entering(path, curves, starts, points, how, half_spaces));
+    let entered = parallel::map(tasks, |_, curves| {
+        let mut found = Vec::new();
+        let clear = match clear {
+            [] => {
+                clear_curves(path, curves.clone(), starts, points, how, &mut found);
+                &found[..]
+            }
+            known => &known[curves.clone()],
+        };
+        entering(path, curves, starts, points, how, clear)
+    });
     let entered = parallel::concat(entered);
     let mut kept =
         KeptOut { started_inside: entered.iter().map(|one| u64::from(one.at_rest)).sum(), ..KeptOut::default() };
@@ -180,6 +196,21 @@ fn turn_out(
 }
 
 impl KeepOut<'_> {
+    /// Counts a use of the clearance, and finds out from the second one on where these curves meet nothing.
+    ///
+    /// # Panics
+    /// As [`keep_out`].
+    pub fn prepare(&self, starts: &[u32]) {
+        self.clearance.half_spaces.used(|curves, found| look_up(Path::chosen(), curves, starts, self, found));
+    }
+
+    /// Up to sixteen curves, to find out which of them are clear; `root` is where their rest shapes have their roots on the
+    /// skin as it is now.
+    #[inline(always)]
+    pub(crate) fn lanes(&self, curves: Range<usize>, root: &Lanes<3>) -> ClearLanes {
+        ClearLanes::of(curves, root, &self.clearance.half_spaces, self.gap)
+    }
+
     /// Whether a curve's root, `now`, is off the skin, on which `root` is.
     #[inline(always)]
     fn is_lifted(&self, now: Vec3, root: &DVec3) -> bool {
@@ -256,14 +287,57 @@ fn look_up_task(curves: Range<usize>, starts: &[u32], how: &KeepOut<'_>, out: &m
     }
 }
 
-kernel! {
-    /// Those of `curves` that cross the skin, and whether they do at rest.
+kernel! { avx512
+    /// Adds to `clear` whether each of `curves` stays in its half-space.
+    fn clear_curves(
+        curves: Range<usize>,
+        starts: &[u32],
+        points: &[Vec3],
+        how: &KeepOut<'_>,
+        clear: &mut Vec<bool>,
+    ) = clear_curves_task;
+}
+
+#[inline(always)]
+fn clear_curves_task(curves: Range<usize>, starts: &[u32], points: &[Vec3], how: &KeepOut<'_>, clear: &mut Vec<bool>) {
+    for first in curves.clone().step_by(LANES) {
+        let hairs = LANES.min(curves.end - first);
+        let mut cvs = [0; LANES];
+        let (mut root, mut cv, mut most) = ([F32x16::splat(0.0); 3], [F32x16::splat(0.0); 3], 0);
+        for lane in 0..hairs {
+            let start = starts[first + lane] as usize;
+            cvs[lane] = starts[first + lane + 1] as usize - start;
+            most = most.max(cvs[lane]);
+            if cvs[lane] > 0 {
+                set(&mut root, lane, to_f32(how.root(first + lane, start)));
+                set(&mut cv, lane, points[start]);
+            }
+        }
+        let mut lanes = how.lanes(first..first + hairs, &root);
+        for k in 1..most {
+            let before = cv;
+            for lane in 0..hairs {
+                if k < cvs[lane] {
+                    set(&mut cv, lane, points[starts[first + lane] as usize + k]);
+                }
+            }
+            lanes.add(k, &before, &cv);
+        }
+        let mask = lanes.mask();
+        for lane in 0..hairs {
+            clear.push(mask >> lane & 1 == 1 && cvs[lane] >= 2);
+        }
+    }
+}
+
+kernel! { avx512
+    /// Those of `curves` that cross the skin, and whether they do at rest; those that are `clear` do not.
     fn entering(
         curves: Range<usize>,
         starts: &[u32],
         points: &[Vec3],
         how: &KeepOut<'_>,
-        half_spaces: &KeptHalfSpaces,
+        clear: &[bool],
     ) -> Vec<Entering> = entering_task;
 }
 
@@ -273,25 +347,20 @@ fn entering_task(
     starts: &[u32],
     points: &[Vec3],
     how: &KeepOut<'_>,
-    half_spaces: &KeptHalfSpaces,
+    clear: &[bool],
 ) -> Vec<Entering> {
     let (mut entered, mut rest) = (Vec::new(), Vec::new());
     let mut nearby = Nearby::default();
-    let (mut clear, mut group) = (0_u16, curves.start);
-    for curve in curves.clone() {
-        if (curve - group).is_multiple_of(LANES) {
-            group = curve;
-            clear = clear_of(curve..curves.end.min(curve + LANES), starts, points, how, half_spaces);
-        }
+    for (curve, is_clear) in curves.zip(clear) {
         let cvs = starts[curve] as usize..starts[curve + 1] as usize;
         let now = &points[cvs.clone()];
-        if clear >> (curve - group) & 1 == 1 || now.len() < 2 || !is_finite(now) {
+        if *is_clear || now.len() < 2 || !is_finite(now) {
             continue;
         }
         let root = how.root(curve, cvs.start);
         let lifted = how.is_lifted(now[0], &root);
         let untested = how.untested(lifted);
-        let known = half_spaces.get(curve).zip(Some(root));
+        let known = how.clearance.half_spaces.get(curve).zip(Some(root));
         rest.resize(now.len(), [0.0; 3]);
         how.write_rest(curve, cvs, now[0], &mut rest);
         let (outside, start, tree) = (tested_start(&rest, untested), tested_start(now, untested), how.skin.tree);
@@ -306,28 +375,6 @@ fn entering_task(
         }
     }
     entered
-}
-
-/// A bit for each of sixteen `curves` that stays in its half-space.
-#[inline(always)]
-fn clear_of(
-    curves: Range<usize>,
-    starts: &[u32],
-    points: &[Vec3],
-    how: &KeepOut<'_>,
-    half_spaces: &KeptHalfSpaces,
-) -> u16 {
-    let mut lanes = ClearLanes::none();
-    for lane in 0..curves.len() {
-        let curve = curves.start + lane;
-        let (first, end) = (starts[curve] as usize, starts[curve + 1] as usize);
-        if let Some(half_space) = half_spaces.get(curve).filter(|_| end - first >= 2) {
-            let root = how.root(curve, first);
-            let untested = how.untested(how.is_lifted(points[first], &root));
-            lanes.put(lane, [first, end - first], half_space, &root, untested);
-        }
-    }
-    lanes.clear(points)
 }
 
 fn is_finite(cvs: &[Vec3]) -> bool {

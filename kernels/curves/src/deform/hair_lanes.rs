@@ -1,11 +1,12 @@
 //! Sixteen hairs side by side, turned as their guides are.
 
-use super::hairs::CurveDeform;
-use super::turns::LaneTurns;
+use super::hairs::{CurveDeform, DeformedCurves};
+use super::turns::{LaneTurns, NO_GUIDE};
 use crate::attach::RootPose;
+use crate::collide::ClearLanes;
 use nalgebra::{Quaternion, Unit};
-use numerics::lanes::{F32x16, F64x16, LANES, get};
-use numerics::vector::{DQuat, DVec3, Vec3};
+use numerics::lanes::{F32x16, F64x16, LANES, Lanes, get, set};
+use numerics::vector::{DQuat, DVec3, Vec3, to_f32};
 use std::ops::Range;
 
 /// Below this the sum of rotations has cancelled, and the guide with the largest weight decides.
@@ -19,9 +20,8 @@ pub(super) struct Share {
     weight: F64x16,
     /// The weight times the rotation from the guide's frame to the hair's, row by row.
     matrix: [F64x16; 9],
-    /// The guide's segment where the last lookup ended, and the end of its segments; equal where there are none.
-    at: [usize; LANES],
-    end: [usize; LANES],
+    /// The guide's segment where the last lookup ended; see [`super::GuideTurns::at`].
+    rows: [u32; LANES],
 }
 
 /// Up to sixteen successive hairs.
@@ -48,16 +48,10 @@ impl<'a> HairLanes<'a> {
         Self { how, rest, first: curves.start, hairs: curves.len(), root, cvs }
     }
 
-    /// Writes the hairs to `out`, whose first row is `base` of all, and the rotation of each CV to `rotations` unless that is
-    /// empty; returns the largest stretch.
+    /// Writes the hairs to `out`, whose first row is `base` of all, and the rotation of each CV to those `done` unless there
+    /// are none; adds the largest stretch, and which hairs are clear if that is wanted.
     #[inline(always)]
-    pub(super) fn follow(
-        &self,
-        shares: &mut Vec<Share>,
-        base: usize,
-        out: &mut [Vec3],
-        rotations: &mut [DQuat],
-    ) -> f64 {
+    pub(super) fn follow(&self, shares: &mut Vec<Share>, base: usize, out: &mut [Vec3], done: &mut DeformedCurves) {
         let mut displacement = self.gather(shares);
         let part = self.blends(0);
         for axis in 0..3 {
@@ -70,15 +64,15 @@ impl<'a> HairLanes<'a> {
             still = Some(self.place_roots(poses, &mut displacement));
         }
         let unguided = unguided(shares);
-        let (mut rest, mut now) = ([F64x16::ZERO; 3], [F64x16::ZERO; 3]);
+        let mut rest = [F64x16::ZERO; 3];
         self.read(0, &mut rest);
-        self.write(0, [&rest, &displacement], &mut now, base, out);
-        self.write_rotations(0, &LaneTurns::none(), base, rotations);
+        let mut now = self.write(0, [&rest, &displacement], base, out);
+        let mut clear = self.clear_lanes(&rest);
         let (mut whole, mut largest) = (F64x16::ZERO, F64x16::ZERO);
         for segment in 0..self.most_cvs().saturating_sub(1) {
             let mut turns = self.turns(shares, segment, &unguided);
             self.take_part(&mut turns, segment);
-            let (from, was) = (rest, now);
+            let (from, before) = (rest, now);
             self.read(segment + 1, &mut rest);
             let along = difference(&rest, &from);
             let mut turned = turns.rotate(&along);
@@ -90,21 +84,43 @@ impl<'a> HairLanes<'a> {
                     displacement[axis].0[lane] += turned[axis].0[lane] - along[axis].0[lane];
                 }
             }
-            self.write(segment + 1, [&rest, &displacement], &mut now, base, out);
-            self.write_rotations(segment, &turns, base, rotations);
-            let (length, new) = (lengths(&along), lengths(&difference(&now, &was)));
+            now = self.write(segment + 1, [&rest, &displacement], base, out);
+            if let Some(clear) = &mut clear {
+                clear.add(segment + 1, &before, &now);
+            }
+            self.write_rotations(segment, &turns, base, &mut done.rotations);
+            let (length, new) = (lengths(&along), lengths(&difference(&widened(&now), &widened(&before))));
             for lane in 0..LANES {
                 let error = (new.0[lane] - length.0[lane]).abs();
                 whole.0[lane] += length.0[lane];
                 largest.0[lane] = if error > largest.0[lane] { error } else { largest.0[lane] };
             }
         }
-        let mut stretch = 0.0;
         for lane in 0..LANES {
             let share = if whole.0[lane] > 0.0 { largest.0[lane] / whole.0[lane] } else { 0.0 };
-            stretch = if share > stretch { share } else { stretch };
+            done.length_error = if share > done.length_error { share } else { done.length_error };
         }
-        stretch
+        if let Some(clear) = clear {
+            let mask = clear.mask();
+            for lane in 0..self.hairs {
+                done.clear.push(mask >> lane & 1 == 1 && self.cvs[lane] >= 2);
+            }
+        }
+    }
+
+    /// Which hairs are clear of what they are kept out of, if that is wanted.
+    #[inline(always)]
+    fn clear_lanes(&self, roots: &[F64x16; 3]) -> Option<ClearLanes> {
+        let keep_out = self.how.keep_out?;
+        let mut root = [F32x16::splat(0.0); 3];
+        for lane in 0..self.hairs {
+            let mut at = DVec3::new(roots[0].0[lane], roots[1].0[lane], roots[2].0[lane]);
+            if let Some(poses) = self.how.poses {
+                at += poses[self.first + lane].translation;
+            }
+            set(&mut root, lane, to_f32(at));
+        }
+        Some(keep_out.lanes(self.first..self.first + self.hairs, &root))
     }
 
     /// Collects the hairs' guides; returns the mean offset of their roots, in the frames of the hairs.
@@ -118,14 +134,13 @@ impl<'a> HairLanes<'a> {
         for rank in 0..self.how.weights.of(self.first).len() {
             let mut rotation = [F64x16::ZERO, F64x16::ZERO, F64x16::ZERO, F64x16([1.0; LANES])];
             let mut arm = [F64x16::ZERO; 3];
-            let mut share = Share { weight: F64x16::ZERO, matrix: [F64x16::ZERO; 9], at: [0; LANES], end: [0; LANES] };
+            let mut share = Share { weight: F64x16::ZERO, matrix: [F64x16::ZERO; 9], rows: [NO_GUIDE; LANES] };
             for lane in 0..self.hairs {
                 let guide = &self.how.weights.of(self.first + lane)[rank];
                 if guide.weight <= 0.0 {
                     continue;
                 }
-                let rows = self.how.turns.rows(guide.guide as usize);
-                (share.at[lane], share.end[lane]) = (rows.start, rows.end);
+                share.rows[lane] = self.how.turns.first(guide.guide as usize);
                 share.weight.0[lane] = f64::from(guide.weight);
                 for part in 0..4 {
                     rotation[part].0[lane] = f64::from(guide.rotation[part]);
@@ -173,19 +188,9 @@ impl<'a> HairLanes<'a> {
     #[inline(always)]
     fn turns(&self, shares: &mut [Share], segment: usize, unguided: &F64x16) -> LaneTurns {
         let mut sum = LaneTurns([F64x16::ZERO; 4]);
-        let mut middles = [0.0; LANES];
-        for lane in 0..self.hairs {
-            if segment + 1 < self.cvs[lane] {
-                middles[lane] = self.how.middles[self.middle(lane, segment)];
-            }
-        }
+        let middles = self.middles(segment);
         for share in shares.iter_mut() {
-            let mut turns = LaneTurns::none();
-            for lane in 0..self.hairs {
-                if segment + 1 < self.cvs[lane] && share.at[lane] < share.end[lane] {
-                    turns.put(lane, &self.how.turns.at(middles[lane], &mut share.at[lane], share.end[lane]));
-                }
-            }
+            let turns = self.how.turns.at(&middles, &mut share.rows);
             sum.add_weighted(&turns, &share.weight, &share.matrix);
         }
         for lane in 0..LANES {
@@ -200,32 +205,29 @@ impl<'a> HairLanes<'a> {
         }
         for lane in 0..self.hairs {
             if sizes.0[lane] <= CANCELLED || sizes.0[lane].is_nan() {
-                unit.put(lane, &self.heaviest(lane, segment));
+                unit.put(lane, &self.heaviest(lane, &middles));
             }
         }
         unit
     }
 
-    /// The rotation, at the middle of a segment, of the guide with the largest weight that has one.
+    /// The rotation, at a fraction of its length, of the guide with the largest weight that has one.
     #[inline(always)]
-    fn heaviest(&self, lane: usize, segment: usize) -> [f64; 4] {
-        const STILL: [f64; 4] = [1.0, 0.0, 0.0, 0.0];
-        if segment + 1 >= self.cvs[lane] || self.how.weights.hairs() == 0 {
-            return STILL;
-        }
-        for guide in self.how.weights.of(self.first + lane) {
-            let rows = self.how.turns.rows(guide.guide as usize);
-            if guide.weight > 0.0 && !rows.is_empty() {
-                let mut at = rows.start;
-                let turn = self.how.turns.at(self.how.middles[self.middle(lane, segment)], &mut at, rows.end);
-                let [x, y, z, w] = guide.rotation;
-                let rotation = Unit::new_unchecked(Quaternion::new(w, x, y, z).cast::<f64>());
-                let axis = rotation * DVec3::new(turn[1], turn[2], turn[3]);
-                let size = (turn[0] * turn[0] + axis.norm_squared()).sqrt();
-                return [turn[0] / size, axis.x / size, axis.y / size, axis.z / size];
+    fn heaviest(&self, lane: usize, fractions: &F64x16) -> [f64; 4] {
+        if self.how.weights.hairs() > 0 {
+            for guide in self.how.weights.of(self.first + lane) {
+                let row = self.how.turns.first(guide.guide as usize);
+                if guide.weight > 0.0 && row != NO_GUIDE {
+                    let turn = self.how.turns.at(fractions, &mut [row; LANES]).get(lane);
+                    let [x, y, z, w] = guide.rotation;
+                    let rotation = Unit::new_unchecked(Quaternion::new(w, x, y, z).cast::<f64>());
+                    let axis = rotation * DVec3::new(turn[1], turn[2], turn[3]);
+                    let size = (turn[0] * turn[0] + axis.norm_squared()).sqrt();
+                    return [turn[0] / size, axis.x / size, axis.y / size, axis.z / size];
+                }
             }
         }
-        STILL
+        [1.0, 0.0, 0.0, 0.0]
     }
 
     /// Replaces rotations by the part that the CVs at the start of their segments follow.
@@ -264,10 +266,17 @@ impl<'a> HairLanes<'a> {
         blends
     }
 
-    /// The row of a segment's middle: hairs before this one have a segment less than CVs.
+    /// The middles of segments; 0 where there is none.
     #[inline(always)]
-    fn middle(&self, lane: usize, segment: usize) -> usize {
-        self.root[lane] - (self.first + lane) + segment
+    fn middles(&self, segment: usize) -> F64x16 {
+        let mut middles = F64x16::ZERO;
+        for lane in 0..self.hairs {
+            if segment + 1 < self.cvs[lane] {
+                // Hairs before this one have a segment less than CVs.
+                middles.0[lane] = self.how.middles[self.root[lane] - (self.first + lane) + segment];
+            }
+        }
+        middles
     }
 
     #[inline(always)]
@@ -292,21 +301,13 @@ impl<'a> HairLanes<'a> {
         }
     }
 
-    /// Writes the CVs `cv`, displaced; `now` is what is written.
+    /// Writes the CVs `cv`, displaced; returns what is written.
     #[inline(always)]
-    fn write(
-        &self,
-        cv: usize,
-        [rest, displacement]: [&[F64x16; 3]; 2],
-        now: &mut [F64x16; 3],
-        base: usize,
-        out: &mut [Vec3],
-    ) {
+    fn write(&self, cv: usize, [rest, displacement]: [&[F64x16; 3]; 2], base: usize, out: &mut [Vec3]) -> Lanes<3> {
         let mut rounded = [F32x16::splat(0.0); 3];
         for axis in 0..3 {
             for lane in 0..LANES {
                 rounded[axis].0[lane] = (rest[axis].0[lane] + displacement[axis].0[lane]) as f32;
-                now[axis].0[lane] = f64::from(rounded[axis].0[lane]);
             }
         }
         for lane in 0..self.hairs {
@@ -314,25 +315,27 @@ impl<'a> HairLanes<'a> {
                 out[self.root[lane] + cv - base] = get(&rounded, lane);
             }
         }
+        rounded
     }
 
-    /// Writes the rotations of CVs `cv`, and of those after them, which have the same unless they are written too.
+    /// Writes the rotations of the CVs at the start of segments, and of those at the end, which have the same unless they
+    /// start one too.
     #[inline(always)]
-    fn write_rotations(&self, cv: usize, turns: &LaneTurns, base: usize, rotations: &mut [DQuat]) {
+    fn write_rotations(&self, segment: usize, turns: &LaneTurns, base: usize, rotations: &mut [DQuat]) {
         if rotations.is_empty() {
             return;
         }
         for lane in 0..self.hairs {
+            if segment + 1 >= self.cvs[lane] {
+                continue;
+            }
             let [w, x, y, z] = turns.get(lane);
             let mut rotation = Unit::new_unchecked(Quaternion::new(w, x, y, z));
             if let Some(poses) = self.how.poses {
                 rotation = poses[self.first + lane].rotation * rotation;
             }
-            for cv in [cv, cv + 1] {
-                if cv < self.cvs[lane] {
-                    rotations[self.root[lane] + cv - base] = rotation;
-                }
-            }
+            let first = self.root[lane] + segment - base;
+            rotations[first..first + 2].fill(rotation);
         }
     }
 }
@@ -379,6 +382,17 @@ fn difference(a: &[F64x16; 3], b: &[F64x16; 3]) -> [F64x16; 3] {
     for axis in 0..3 {
         for lane in 0..LANES {
             out[axis].0[lane] = a[axis].0[lane] - b[axis].0[lane];
+        }
+    }
+    out
+}
+
+#[inline(always)]
+fn widened(points: &Lanes<3>) -> [F64x16; 3] {
+    let mut out = [F64x16::ZERO; 3];
+    for axis in 0..3 {
+        for lane in 0..LANES {
+            out[axis].0[lane] = f64::from(points[axis].0[lane]);
         }
     }
     out

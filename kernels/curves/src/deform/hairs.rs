@@ -3,6 +3,7 @@
 use super::hair_lanes::HairLanes;
 use super::turns::GuideTurns;
 use crate::attach::{RootPose, tasks};
+use crate::collide::KeepOut;
 use crate::guides::GuideWeights;
 use numerics::lanes::LANES;
 use numerics::masked::Masked;
@@ -12,7 +13,7 @@ use numerics::vector::{DQuat, Vec3};
 use std::ops::Range;
 
 /// What a groom follows.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct CurveDeform<'a> {
     /// The guides of each hair.
     pub weights: &'a GuideWeights,
@@ -20,11 +21,13 @@ pub struct CurveDeform<'a> {
     /// [`super::segment_middles`].
     pub middles: &'a [f64],
     /// How the guides have turned.
-    pub turns: &'a GuideTurns,
+    pub turns: &'a GuideTurns<'a>,
     /// How the hairs' roots have moved and turned; `None` if they have not.
     pub poses: Option<&'a [RootPose]>,
     /// Fraction of the guides' turn that hairs follow, 0..1; a mask has one value for each CV.
     pub blend: Masked<'a, f32>,
+    /// What the results are kept out of afterwards, prepared: as they are written, those are found that it need not test.
+    pub keep_out: Option<&'a KeepOut<'a>>,
 }
 
 /// Hairs that followed guides.
@@ -35,6 +38,8 @@ pub struct DeformedCurves {
     pub points: Vec<Vec3>,
     /// The rotation of each CV, that of the segment after it; empty if not asked for.
     pub rotations: Vec<DQuat>,
+    /// Whether each curve is known to meet nothing of what it is to be kept out of; empty if that is not given.
+    pub clear: Vec<bool>,
     /// Largest change of a segment's length ÷ its curve's length, measured on the results.
     pub length_error: f64,
 }
@@ -59,13 +64,17 @@ pub(super) fn deform_curves_on(
     let done = parallel::map(tasks(starts, &mut points), |_, (curves, out)| {
         follow(path, curves, starts, rest, how, out, with_rotations)
     });
-    let (errors, rotations): (Vec<f64>, Vec<Vec<DQuat>>) = done.into_iter().unzip();
-    let length_error = errors.into_iter().fold(0.0, f64::max);
-    DeformedCurves { points, rotations: parallel::concat(rotations), length_error }
+    let mut all = DeformedCurves::default();
+    for mut one in done {
+        all.length_error = all.length_error.max(one.length_error);
+        all.rotations.append(&mut one.rotations);
+        all.clear.append(&mut one.clear);
+    }
+    DeformedCurves { points, ..all }
 }
 
 kernel! { avx512
-    /// Deforms `curves` into `out`; returns the largest stretch, and rotations if they are wanted.
+    /// Deforms `curves` into `out`; returns all but the points, and rotations if they are wanted.
     fn follow(
         curves: Range<usize>,
         starts: &[u32],
@@ -73,7 +82,7 @@ kernel! { avx512
         how: &CurveDeform<'_>,
         out: &mut [Vec3],
         with_rotations: bool,
-    ) -> (f64, Vec<DQuat>) = follow_task;
+    ) -> DeformedCurves = follow_task;
 }
 
 #[inline(always)]
@@ -84,18 +93,22 @@ fn follow_task(
     how: &CurveDeform<'_>,
     out: &mut [Vec3],
     with_rotations: bool,
-) -> (f64, Vec<DQuat>) {
+) -> DeformedCurves {
     let base = starts[curves.start] as usize;
-    let (mut largest, mut shares, mut rotations) = (0.0_f64, Vec::new(), Vec::new());
+    let (mut done, mut shares) = (DeformedCurves::default(), Vec::new());
     if with_rotations {
-        rotations.resize(out.len(), DQuat::identity());
+        // Of CVs that start no segment and end none.
+        for curve in curves.clone() {
+            let rotation = how.poses.map_or_else(DQuat::identity, |poses| poses[curve].rotation);
+            done.rotations.resize(starts[curve + 1] as usize - base, rotation);
+        }
     }
     let mut first = curves.start;
     while first < curves.end {
         let end = if curves.end - first > LANES { first + LANES } else { curves.end };
         let hairs = HairLanes::of(first..end, starts, rest, how);
-        largest = largest.max(hairs.follow(&mut shares, base, out, &mut rotations));
+        hairs.follow(&mut shares, base, out, &mut done);
         first = end;
     }
-    (largest, rotations)
+    done
 }

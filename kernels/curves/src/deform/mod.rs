@@ -20,7 +20,7 @@ mod turns;
 
 pub use hairs::{CurveDeform, DeformedCurves, deform_curves};
 pub use roots::{carried_poses, guide_poses};
-pub use turns::{GuideTurns, segment_middles};
+pub use turns::{GuideSegments, GuideTurns, segment_middles};
 
 #[cfg(test)]
 mod tests;

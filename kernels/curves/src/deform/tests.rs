@@ -56,9 +56,17 @@ fn weights(guides: &Curves, hairs: &Curves, count: usize) -> GuideWeights {
 
 /// Hairs with roots at rest.
 fn deformed(hairs: &Curves, guides: [&Curves; 2], weights: &GuideWeights, blend: f32) -> Vec<Point> {
-    let turns = GuideTurns::new(&guides[0].starts, &guides[0].points, &guides[1].points, None);
+    let segments = GuideSegments::of(&guides[0].starts, &guides[0].points);
+    let turns = GuideTurns::new(&segments, &guides[0].starts, [&guides[0].points, &guides[1].points], None);
     let middles = segment_middles(&hairs.starts, &hairs.points);
-    let how = CurveDeform { weights, middles: &middles, turns: &turns, poses: None, blend: Masked::uniform(blend) };
+    let how = CurveDeform {
+        weights,
+        middles: &middles,
+        turns: &turns,
+        poses: None,
+        blend: Masked::uniform(blend),
+        keep_out: None,
+    };
     deform_curves(&hairs.starts, &hairs.points, &how, false).points
 }
 
@@ -164,6 +172,23 @@ fn turns_are_carried_from_frame_to_frame() {
     assert!(apart(&hair, &[[0.0; 3], [0.1, 0.0, 0.0], [0.2, 0.0, 0.0]]) < 1e-6);
 }
 
+/// The last CV of a curve turns as its last segment does, however long the curves beside it are.
+#[test]
+fn last_cvs_turn_with_their_segments() {
+    let (hairs, rest, now) = (groom(40, 3), bent([0.0; 3], 0.1, &[0.0; 2]), bent([0.0; 3], 0.1, &[0.7; 2]));
+    let guides = [rest, now].map(|guide| Curves::of(&[guide]));
+    let weights = weights(&guides[0], &hairs, 1);
+    let segments = GuideSegments::of(&guides[0].starts, &guides[0].points);
+    let turns = GuideTurns::new(&segments, &guides[0].starts, [&guides[0].points, &guides[1].points], None);
+    let middles = segment_middles(&hairs.starts, &hairs.points);
+    let blend = Masked::uniform(1.0);
+    let how = CurveDeform { weights: &weights, middles: &middles, turns: &turns, poses: None, blend, keep_out: None };
+    let turn = rotation(DVec3::z(), 0.7);
+    for found in deform_curves(&hairs.starts, &hairs.points, &how, true).rotations {
+        assert!((found.coords - turn.coords).amax() < 1e-6, "{found:?}");
+    }
+}
+
 #[test]
 fn rigid_motion_of_the_guides_moves_hairs_rigidly() {
     let (hairs, guides) = (groom(200, 3), groom(30, 4));
@@ -174,10 +199,18 @@ fn rigid_motion_of_the_guides_moves_hairs_rigidly() {
         let weights = weights(&guides, &hairs, 3);
         let guide_poses = guide_poses(&guides.starts, &guides.points, &now.points);
         let poses = carried_poses(&weights, &hairs.roots(), &guides.roots(), &guide_poses);
-        let turns = GuideTurns::new(&guides.starts, &guides.points, &now.points, Some(&guide_poses));
+        let segments = GuideSegments::of(&guides.starts, &guides.points);
+        let turns = GuideTurns::new(&segments, &guides.starts, [&guides.points, &now.points], Some(&guide_poses));
         let middles = segment_middles(&hairs.starts, &hairs.points);
         let blend = Masked::uniform(1.0);
-        let how = CurveDeform { weights: &weights, middles: &middles, turns: &turns, poses: Some(&poses), blend };
+        let how = CurveDeform {
+            weights: &weights,
+            middles: &middles,
+            turns: &turns,
+            poses: Some(&poses),
+            blend,
+            keep_out: None,
+        };
         let deformed = deform_curves(&hairs.starts, &hairs.points, &how, true);
         assert!(apart(&deformed.points, &hairs.moved(rigid).points) < 2e-6, "{axis:?}");
         let off = |found: &DQuat| (found.coords - turn.coords).amax().min((found.coords + turn.coords).amax());
@@ -216,11 +249,13 @@ fn lengths_are_kept_whatever_guides_do() {
             _ => {}
         }
     }
-    let turns = GuideTurns::new(&guides.starts, &guides.points, &now.points, None);
+    let segments = GuideSegments::of(&guides.starts, &guides.points);
+    let turns = GuideTurns::new(&segments, &guides.starts, [&guides.points, &now.points], None);
     let (weights, middles) = (weights(&guides, &hairs, 3), segment_middles(&hairs.starts, &hairs.points));
     for blend in [1.0, 0.3] {
         let blend = Masked::uniform(blend);
-        let how = CurveDeform { weights: &weights, middles: &middles, turns: &turns, poses: None, blend };
+        let how =
+            CurveDeform { weights: &weights, middles: &middles, turns: &turns, poses: None, blend, keep_out: None };
         let deformed = deform_curves(&hairs.starts, &hairs.points, &how, false);
         assert!(deformed.points.as_flattened().iter().all(|x| x.is_finite()));
         assert!(deformed.length_error < 1e-5, "{}", deformed.length_error);

@@ -5,7 +5,6 @@ use nalgebra::{Quaternion, Vector3};
 use numerics::lanes::{F64x16, LANES};
 use numerics::parallel;
 use numerics::vector::{self, DQuat, DVec3, to_f32, to_f64};
-use std::ops::Range;
 
 /// A rotation as w, x, y, z. Along a guide its sign is continuous: turns of more than half a revolution are kept
 /// apart from the lesser ones with the same result.
@@ -94,24 +93,59 @@ fn cross_side_by_side(a: &[F64x16; 3], b: &[F64x16; 3]) -> [F64x16; 3] {
     out
 }
 
-/// A segment of a guide.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct GuideSegment {
-    /// Its middle at rest, from 0 at the root to 1 at the tip.
-    middle: f64,
-    /// Its rotation since rest, in the frame of its guide's root.
-    turn: Turn,
+/// The segments of guides at rest, in rows: those of a guide, then one that ends them.
+///
+/// Row [`NO_GUIDE`] is that of no guide.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GuideSegments {
+    /// The first row of each guide; [`NO_GUIDE`] for one without segments.
+    firsts: Vec<u32>,
+    /// The middle of each row's segment, from 0 at the root to 1 at the tip; infinite where a guide has ended.
+    middles: Vec<f64>,
+}
+
+/// The row of a guide that does not turn.
+pub(super) const NO_GUIDE: u32 = 0;
+
+impl GuideSegments {
+    /// Those of the guides `rest[starts[i]..starts[i + 1]]`.
+    ///
+    /// # Panics
+    /// If `starts` does not run from 0 to the number of points.
+    pub fn of(starts: &[u32], rest: &[[f32; 3]]) -> Self {
+        let mut of_segments = &segment_middles(starts, rest)[..];
+        let (mut firsts, mut middles) = (Vec::with_capacity(starts.len()), vec![f64::INFINITY; 2]);
+        for ends in starts.windows(2) {
+            let (mine, others) = of_segments.split_at((ends[1] - ends[0]).saturating_sub(1) as usize);
+            firsts.push(if mine.is_empty() { NO_GUIDE } else { middles.len() as u32 });
+            if !mine.is_empty() {
+                middles.extend_from_slice(mine);
+                middles.push(f64::INFINITY);
+            }
+            of_segments = others;
+        }
+        Self { firsts, middles }
+    }
+
+    /// The first row of a guide.
+    #[inline(always)]
+    pub(super) fn first(&self, guide: usize) -> u32 {
+        self.firsts[guide]
+    }
 }
 
 /// The rotation of each segment of the guides since rest.
 #[derive(Clone, Debug, PartialEq)]
-pub struct GuideTurns {
-    /// First row of each guide's segments, and the end of the last.
-    starts: Vec<u32>,
-    segments: Vec<GuideSegment>,
+pub struct GuideTurns<'a> {
+    segments: &'a GuideSegments,
+    /// Of each row, in the frame of the root of its guide; that which ends a guide repeats its last.
+    turns: Vec<Turn>,
     /// From where the skin carries each root to where it is, in the same frame, metres.
     offsets: Vec<DVec3>,
 }
+
+/// The rotation of what does not turn.
+const STILL: Turn = [1.0, 0.0, 0.0, 0.0];
 
 /// Number of guides in a task.
 const TASK: usize = 64;
@@ -119,38 +153,47 @@ const TASK: usize = 64;
 /// Below this, of 1 + the cosine between two directions, their cross product has lost half of its digits.
 const OPPOSITE: f64 = 1e-10;
 
-impl GuideTurns {
-    /// The rotations of guides from `rest[starts[i]..starts[i + 1]]` to the same ranges of `now`, whose roots' frames
-    /// have moved by `poses` (`None`: not at all).
+impl<'a> GuideTurns<'a> {
+    /// The rotations of guides from `rest[starts[i]..starts[i + 1]]`, which have these `segments`, to the same ranges of
+    /// `now`, whose roots' frames have moved by `poses` (`None`: not at all).
     ///
     /// # Panics
-    /// If `starts` does not run from 0 to the number of points of both, or there are fewer poses than guides.
-    pub fn new(starts: &[u32], rest: &[[f32; 3]], now: &[[f32; 3]], poses: Option<&[RootPose]>) -> Self {
+    /// If `starts` does not run from 0 to the number of points of both, there are fewer poses than guides, or `segments` are
+    /// others.
+    pub fn new(
+        segments: &'a GuideSegments,
+        starts: &[u32],
+        [rest, now]: [&[[f32; 3]]; 2],
+        poses: Option<&[RootPose]>,
+    ) -> Self {
         let guides = starts.len().saturating_sub(1);
-        let one = |guide: usize| {
-            let cvs = starts[guide] as usize..starts[guide + 1] as usize;
-            let still = RootPose { translation: DVec3::zeros(), rotation: DQuat::identity(), lost: false };
-            let pose = poses.map_or(still, |poses| poses[guide]);
-            turns_of(&rest[cvs.clone()], &now[cvs], &pose)
-        };
-        let found = parallel::tabulate(guides, TASK, one);
-        let middles = segment_middles(starts, rest);
-        let mut all =
-            Self { starts: vec![0], segments: Vec::with_capacity(rest.len()), offsets: Vec::with_capacity(guides) };
-        for (turns, offset) in found {
-            for turn in turns {
-                all.segments.push(GuideSegment { middle: middles[all.segments.len()], turn });
-            }
-            all.offsets.push(offset);
-            all.starts.push(all.segments.len() as u32);
+        let (mut turns, mut offsets) = (vec![STILL; segments.middles.len()], vec![DVec3::zeros(); guides]);
+        let mut left = &mut turns[2..];
+        let mut tasks = Vec::new();
+        for (first, offsets) in (0..guides).step_by(TASK).zip(offsets.chunks_mut(TASK)) {
+            let guides = first..first + offsets.len();
+            let rows = guides.clone().map(|guide| rows_of(starts[guide + 1] - starts[guide])).sum();
+            let (mine, others) = left.split_at_mut(rows);
+            tasks.push((guides, mine, offsets));
+            left = others;
         }
-        all
+        parallel::for_each(tasks, |_, (guides, mut turns, offsets)| {
+            for (guide, offset) in guides.zip(offsets) {
+                let cvs = starts[guide] as usize..starts[guide + 1] as usize;
+                let still = RootPose { translation: DVec3::zeros(), rotation: DQuat::identity(), lost: false };
+                let pose = poses.map_or(still, |poses| poses[guide]);
+                let (mine, others) = turns.split_at_mut(rows_of(starts[guide + 1] - starts[guide]));
+                *offset = write_turns(&rest[cvs.clone()], &now[cvs], &pose, mine);
+                turns = others;
+            }
+        });
+        Self { segments, turns, offsets }
     }
 
-    /// The rows of a guide's segments.
+    /// The first row of a guide.
     #[inline(always)]
-    pub(super) fn rows(&self, guide: usize) -> Range<usize> {
-        self.starts[guide] as usize..self.starts[guide + 1] as usize
+    pub(super) fn first(&self, guide: usize) -> u32 {
+        self.segments.first(guide)
     }
 
     #[inline(always)]
@@ -158,47 +201,76 @@ impl GuideTurns {
         &self.offsets[guide]
     }
 
-    /// The rotation at a fraction of a guide, interpolated between the middles of its segments, of which the last is before
-    /// row `end`; `at` is the row of the last call for a smaller fraction, or the first.
+    /// The rotations at fractions of guides, interpolated between the middles of their segments; `rows` are those of the
+    /// last call for smaller fractions, or the guides' first.
+    ///
+    /// Without branches: the fractions of hairs whose segments end where those of guides do are a rounding above or below
+    /// the middles, which no CPU predicts.
     #[inline(always)]
-    pub(super) fn at(&self, fraction: f64, at: &mut usize, end: usize) -> Turn {
-        let segments = &self.segments[*at..end];
-        let mut here = &segments[0];
-        for next in &segments[1..] {
-            if next.middle <= fraction {
-                (here, *at) = (next, *at + 1);
-                continue;
+    pub(super) fn at(&self, fractions: &F64x16, rows: &mut [u32; LANES]) -> LaneTurns {
+        let middles = &self.segments.middles[..];
+        let (mut here, mut next) = (F64x16::ZERO, F64x16::ZERO);
+        loop {
+            for lane in 0..LANES {
+                let row = rows[lane] as usize;
+                let [before, after] = [middles[row], middles[row + 1]];
+                (here.0[lane], next.0[lane]) = (before, after);
             }
-            let mut turn = here.turn;
-            if fraction > here.middle {
-                let share = (fraction - here.middle) / (next.middle - here.middle);
-                for part in 0..4 {
-                    turn[part] += (next.turn[part] - turn[part]) * share;
-                }
+            let mut passed = 0;
+            for lane in 0..LANES {
+                let is_past = u32::from(next.0[lane] <= fractions.0[lane]);
+                rows[lane] += is_past;
+                passed |= is_past;
             }
-            return turn;
+            if passed == 0 {
+                break;
+            }
         }
-        here.turn
+        let mut shares = F64x16::ZERO;
+        for lane in 0..LANES {
+            let share = (fractions.0[lane] - here.0[lane]) / (next.0[lane] - here.0[lane]);
+            shares.0[lane] = if fractions.0[lane] > here.0[lane] { share } else { 0.0 };
+        }
+        let mut turns = [STILL; LANES];
+        for lane in 0..LANES {
+            let (row, share) = (rows[lane] as usize, shares.0[lane]);
+            let [here, next] = [&self.turns[row], &self.turns[row + 1]];
+            for part in 0..4 {
+                turns[lane][part] = here[part] + (next[part] - here[part]) * share;
+            }
+        }
+        let mut out = LaneTurns([F64x16::ZERO; 4]);
+        for part in 0..4 {
+            for lane in 0..LANES {
+                out.0[part].0[lane] = turns[lane][part];
+            }
+        }
+        out
     }
 }
 
-/// The rotations of one guide's segments, and the offset of its root.
-fn turns_of(rest: &[[f32; 3]], now: &[[f32; 3]], pose: &RootPose) -> (Vec<Turn>, DVec3) {
-    let Some((first, moved)) = rest.first().zip(now.first()) else { return (Vec::new(), DVec3::zeros()) };
+/// Number of rows of a guide with so many CVs.
+fn rows_of(cvs: u32) -> usize {
+    if cvs >= 2 { cvs as usize } else { 0 }
+}
+
+/// Writes the rotations of one guide's rows; returns the offset of its root.
+fn write_turns(rest: &[[f32; 3]], now: &[[f32; 3]], pose: &RootPose, turns: &mut [Turn]) -> DVec3 {
+    let Some((first, moved)) = rest.first().zip(now.first()) else { return DVec3::zeros() };
     let back = pose.rotation.inverse();
-    let offset = back * (to_f64(*moved) - (to_f64(*first) + pose.translation));
     let mut turn = Quaternion::new(1.0, 0.0, 0.0, 0.0);
     let segment = |cvs: &[[f32; 3]], k: usize| (to_f64(cvs[k + 1]) - to_f64(cvs[k])).try_normalize(0.0);
-    let mut turns = Vec::with_capacity(rest.len().saturating_sub(1));
-    for k in 0..rest.len() - 1 {
-        // A segment without a direction turns as the one before.
-        if let (Some(from), Some(to)) = (segment(rest, k), segment(now, k)) {
+    for (k, out) in turns.iter_mut().enumerate() {
+        // A segment without a direction turns as the one before, and so does what ends the guide.
+        if k + 1 < rest.len()
+            && let (Some(from), Some(to)) = (segment(rest, k), segment(now, k))
+        {
             turn = smallest_rotation(&(rotated(&turn, &from)), &(back * to)) * turn;
             turn /= turn.norm();
         }
-        turns.push([turn.w, turn.i, turn.j, turn.k]);
+        *out = [turn.w, turn.i, turn.j, turn.k];
     }
-    (turns, offset)
+    back * (to_f64(*moved) - (to_f64(*first) + pose.translation))
 }
 
 /// A vector rotated by a unit quaternion.
