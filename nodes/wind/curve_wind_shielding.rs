@@ -70,6 +70,7 @@ const OUT: Output = Output::like("curves", &CURVES, "The curves, with less wind 
 metrics! { METRICS:
     SHELTERED = Metric::new("sheltered_curves", Unit::None, "Curves that are at least partly sheltered.");
     RAYS = Metric::new("rays", Unit::None, "Rays, or cones, that were cast: one per CV.");
+    EMPTY_GROUP = group::EMPTY;
 }
 
 pub(crate) static NODE: Node = Node::new(
@@ -111,6 +112,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let amount = cx.get(SHIELD).value;
     let looks = amount > 0.0 || cx.wants(SHIELDED);
     let group = Group::of(&cx.get(GROUP), &curves)?;
+    cx.publish(EMPTY_GROUP, group::is_empty(group.as_ref()));
     if !looks && !cx.wants(SHELTER) {
         cx.publish(SHELTERED, 0.0);
         cx.publish(RAYS, 0.0);
