@@ -83,6 +83,7 @@ metrics! { METRICS:
     WINDOW_FRAMES = Metric::new("window_frames", Unit::Frames,
         "Number of previous frames that the result depends on, unless the scene starts later.");
     MAX_OFFSET = Metric::new("max_offset", Unit::Metres, "The largest distance of a CV from its incoming position.");
+    EMPTY_GROUP = group::EMPTY;
 }
 
 pub(crate) static NODE: Node = Node::new(
@@ -174,7 +175,9 @@ impl Chain for Swing {
     fn output(&self, cx: &FrameCx) -> Result<Outputs> {
         let mut curves = cx.edit(CURVES);
         let blend = cx.mask(BLEND, cx.part(CURVES))?;
-        let factors = Group::of(&cx.get(GROUP), cx.part(CURVES))?.map(|group| group.factors(blend));
+        let group = Group::of(&cx.get(GROUP), cx.part(CURVES))?;
+        cx.publish(EMPTY_GROUP, group::is_empty(group.as_ref()));
+        let factors = group.map(|group| group.factors(blend));
         let clock = Clock { fps: cx.fps(), seed: 0 };
         cx.publish(WINDOW_FRAMES, f64::from(past(cx.params(), clock).frames));
         let mut farthest = 0.0;

@@ -120,6 +120,7 @@ const OUT: Output = Output::like("curves", &CURVES, "The bent curves. Lengths an
 metrics! { METRICS:
     MAX_ANGLE = Metric::new("max_angle", Unit::Radians, "The largest angle by which a segment was turned.");
     LENGTH_ERROR = Metric::length_error();
+    EMPTY_GROUP = group::EMPTY;
 }
 
 pub(crate) static NODE: Node = Node::new(
@@ -170,7 +171,9 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
         })
     };
     let rotate = cx.mask(GLOBAL_ROTATE, &curves)?;
-    let factors = Group::of(&cx.get(GROUP), &curves)?.map(|group| group.factors(rotate));
+    let group = Group::of(&cx.get(GROUP), &curves)?;
+    cx.publish(EMPTY_GROUP, group::is_empty(group.as_ref()));
+    let factors = group.map(|group| group.factors(rotate));
     let bent = bend(
         curves.runs().starts(),
         curves.positions(),

@@ -25,6 +25,7 @@ use std::sync::{Arc, OnceLock};
 use curves::collide::{AtRest, Collide, ContactMethod, SkinMesh, collide};
 use engine::prelude::*;
 use numerics::tree::TriangleTree;
+use numerics::vector::{largest, to_f64};
 
 use crate::shared::group::{self, Group, taken};
 use crate::shared::surface::{skin, tree};
@@ -75,7 +76,8 @@ params! { PARAMS:
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     WIDTH: Param<Maskable> = Param::maskable("width", 0.0,
         "Diameter of the curves in collisions: their axes keep half of it from colliders, from where they are that far away \
-         on; `offset_root` lifts roots. In corners between two surfaces it may be less. At 0 curves are infinitely thin.")
+         on; `offset_root` lifts roots. Where no turn of a segment is far enough from all surfaces, as in corners, it may \
+         be less: see `too_near`. At 0 curves are infinitely thin.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     COHERENCE: Param<Maskable> = Param::maskable("coherence", 0.0,
         "How strongly curves blown into the skin are redirected outward, so that they do not flip from one side to the \
@@ -105,7 +107,8 @@ const OUT: Output = Output::like("curves", &CURVES, "The curves, bent around the
 
 metrics! { METRICS:
     CROSSINGS_LEFT = Metric::new("crossings_left", Unit::None,
-        "Segments of the output that cross a collider. Not counted while `blend` is 0.")
+        "Segments of the output that cross a collider; with a `group`, those of its curves. Not counted while `blend` is \
+         0.")
         .warn_above(0.0,
         "These segments still reach into a collider; `unfreed` of the output says on which curves, so that they can be \
          seen and hidden. Either their curves cross a collider at rest and no turn frees them (`unfreed_segments`); or \
@@ -120,8 +123,9 @@ metrics! { METRICS:
             Raise `coherence`, or resample the curves to shorter segments where the skin has folds.");
     STARTED_INSIDE = Metric::new("started_inside", Unit::None, "Curves that cross a collider in their rest shape.")
         .warn_above(0.0, "These curves cross a collider before any wind blows, so there is no free position to start \
-            from: they are turned outwards as far as possible. Clear them of the collider in their rest shape, raise \
-            `offset_root`, or leave out that collider.");
+            from: they are turned outwards as far as possible. If they grow on another mesh than the first collider, wire \
+            the skin that they grow on into `skin`; if on several, merge these. Else clear them of the collider in \
+            their rest shape, raise `offset_root`, or leave out that collider.");
     LOW_ROOTS = Metric::new("low_roots", Unit::None,
         "Roots in creases so narrow that a move of 4 times `offset_root` does not bring them `offset_root` away from all \
          faces. They are moved as far away as that allows.")
@@ -132,7 +136,32 @@ metrics! { METRICS:
         "Segments stopped by a collider before they reach the direction that the wind gave them.");
     DEEPEST = Metric::new("deepest_overlap", Unit::Metres,
         "How far the deepest unfreed segment reaches through a surface.");
+    TOO_NEAR = Metric::new("too_near", Unit::None,
+        "Segments whose axes are nearer to a collider than half of `width`, although their curves are that far away before. \
+         With a `group`, those of its curves.")
+        .warn_above(0.0, "These segments are nearer to a collider than half of `width`, by at most {missing_width} of that. \
+            They lie where no turn is far enough from all surfaces, or `blend` is below 1. Lower `width` there, which may \
+            be masked, or resample the curves to shorter segments.");
+    MISSING_WIDTH = Metric::new("missing_width", Unit::None,
+        "The largest share of half of `width` that these segments are too near: 1 for one that reaches the collider.");
+    NEAR_ROOTS = Metric::new("near_roots", Unit::None,
+        "Curves whose roots, after `offset_root`, are nearer to a collider than half of `width`.")
+        .warn_above(0.0, "These curves begin nearer to a collider than half of `width`, so their axes are that far away only \
+            from the end of a later segment on. Raise `offset_root` to half of `width`, or lower `width` at roots.");
+    ROOTS_APART = Metric::new("roots_apart", Unit::Metres,
+        "The largest distance between the root of a curve and its root in `rest`.");
+    ROOTS_OFF = Metric::new("roots_off", Unit::None,
+        "Curves whose roots are farther from those in `rest` than `offset_root` and `gap`.")
+        .warn_above(0.0, "The roots of these curves are up to {roots_apart} m from their roots in `rest`, which are lifted off \
+            the skin: their curves may begin below it, and are then kept below. Wire into `rest` the curves that go into \
+            the first wind node, at the same pose of the skin.");
+    ROOT_LIFT = Metric::new("root_lift", Unit::None,
+        "The largest `offset_root`, as a share of the median length of the curves.")
+        .warn_above(0.1, "`offset_root` moves curves off the skin by {root_lift} of their median length: they stand visibly \
+            above it. Lower `offset_root` and `gap`. If the scene is in millimetres or centimetres, convert it to metres \
+            with `scale` of the nodes that read it.");
     LENGTH_ERROR = Metric::length_error();
+    EMPTY_GROUP = group::EMPTY;
     JUMPS = Metric::jumps();
 }
 
@@ -141,7 +170,7 @@ const MANY: f64 = 20.0;
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Collision",
-    9,
+    10,
     "Keeps curves that are bent by wind out of colliders. Each segment, root to tip, turns from its rest direction \
      towards the direction that the wind gave it, until it touches a collider. Place this node after the wind, and wire \
      the curves from before the wind into `rest`. Attributes of each curve: `unfreed`, the number of segments that still \
@@ -197,7 +226,9 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         ))
         .hint("give `rest` the curves as they were before the wind nodes"));
     }
-    let found = match Group::of(&cx.get(GROUP), &curves)? {
+    let group = Group::of(&cx.get(GROUP), &curves)?;
+    cx.publish(EMPTY_GROUP, group::is_empty(group.as_ref()));
+    let found = match group {
         None => collided(cx, &curves, rest)?,
         Some(group) => collided_of(cx, &group, &curves, rest)?,
     };
@@ -225,6 +256,8 @@ struct KeptAtRest {
     curves: AtRest,
     /// [`LOW_ROOT`], one array for all frames.
     low_root: OnceLock<Column>,
+    /// Median length of the curves, metres; 0 without curves.
+    median_length: OnceLock<f64>,
 }
 
 /// The curves of a group collided; the others as they are, with 0 of everything.
@@ -287,7 +320,11 @@ fn collided(cx: &Cx, curves: &Component, rest: &Component) -> Result<Found> {
         offsets: offset_root.mask.map_or_else(Vec::new, at_root),
         lofts: how.loft.value > 0.0,
     };
-    let of = || KeptAtRest { curves: AtRest::of(curves.element_count()), low_root: OnceLock::new() };
+    let of = || KeptAtRest {
+        curves: AtRest::of(curves.element_count()),
+        low_root: OnceLock::new(),
+        median_length: OnceLock::new(),
+    };
     let at_rest = rest.kept(still, || Ok(of()))?;
     how.at_rest = Some(&at_rest.curves);
     let collided = collide(starts, rest.positions(), curves.positions(), &how);
@@ -298,7 +335,23 @@ fn collided(cx: &Cx, curves: &Component, rest: &Component) -> Result<Found> {
     cx.publish(LOW_ROOTS, collided.low_roots as f64);
     cx.publish(CONTACTS, collided.contacts as f64);
     cx.publish(DEEPEST, collided.deepest_overlap);
+    cx.publish(TOO_NEAR, collided.too_near as f64);
+    cx.publish(MISSING_WIDTH, collided.missing_width);
+    cx.publish(NEAR_ROOTS, collided.near_roots as f64);
     cx.publish(LENGTH_ERROR, collided.length_error);
+    let roots = Roots::of(curves, rest, &how);
+    cx.publish(ROOTS_APART, roots.apart);
+    cx.publish(ROOTS_OFF, roots.off as f64);
+    let median = match at_rest.median_length.get() {
+        Some(median) => *median,
+        None => {
+            let median = median_length(rest);
+            let _ = at_rest.median_length.set(median);
+            median
+        }
+    };
+    let lift = if how.skin.is_some() && median > 0.0 { roots.most_lifted / median } else { 0.0 };
+    cx.publish(ROOT_LIFT, lift);
     let low_root = match at_rest.low_root.get() {
         Some(low_root) => low_root.clone(),
         None => {
@@ -309,6 +362,48 @@ fn collided(cx: &Cx, curves: &Component, rest: &Component) -> Result<Found> {
     };
     let of_curves = [Column::new(collided.crossings), Column::new(collided.blended), low_root];
     Ok(Found { points: collided.points, of_curves })
+}
+
+/// The roots of curves, compared with those at rest.
+#[derive(Default)]
+struct Roots {
+    /// The largest distance between both, metres.
+    apart: f64,
+    /// Number of roots farther away than what keeps them off the skin.
+    off: usize,
+    /// The largest distance that they are lifted, metres.
+    most_lifted: f64,
+}
+
+impl Roots {
+    fn of(curves: &Component, rest: &Component, how: &Collide<'_>) -> Self {
+        let mut found = Self::default();
+        for root in curves.runs().ranges().filter(|cvs| !cvs.is_empty()).map(|cvs| cvs.start) {
+            let [now, before] = [curves, rest].map(|part| part.positions()[root]);
+            let apart = (to_f64(now) - to_f64(before)).norm();
+            let lifted = how.offset_root.at(root);
+            // Positions rounded to f32 may be apart by some 2⁻²³ of them.
+            let allowed = lifted.max(how.gap.at(root)) + ROUNDING * f64::from(largest(now));
+            found.apart = found.apart.max(apart);
+            found.off += usize::from(apart > allowed);
+            found.most_lifted = found.most_lifted.max(lifted);
+        }
+        found
+    }
+}
+
+/// Rounding of positions that two nodes computed, relative to their largest coordinate.
+const ROUNDING: f64 = 1e-6;
+
+/// The median length of curves, metres; 0 without curves. Of an even number the longer of the two in the middle.
+fn median_length(curves: &Component) -> f64 {
+    let length = |cvs: std::ops::Range<usize>| -> f64 {
+        let steps = curves.positions()[cvs].windows(2);
+        steps.map(|ends| (to_f64(ends[1]) - to_f64(ends[0])).norm()).sum()
+    };
+    let mut lengths: Vec<f64> = curves.runs().ranges().map(length).collect();
+    let middle = lengths.len() / 2;
+    if lengths.is_empty() { 0.0 } else { *lengths.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 /// Everything that the test of rest curves depends on besides the curves; equal if the trees are the same objects.

@@ -116,6 +116,7 @@ const OUT: Output = Output::like(
 );
 
 metrics! { METRICS:
+    EMPTY_GROUP = group::EMPTY;
     ACTIVE_GUSTS = Metric::new("active_gusts", Unit::None,
         "Gusts that are blowing or fading, without those placed by hand.");
     REACHED_POINTS = Metric::new("reached_points", Unit::None, "CVs within any gust, including those placed by hand.");
@@ -177,6 +178,7 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
     cx.publish(DROPPED_GUSTS, sent.dropped as f64);
     cx.publish(UNLOOPED_GUSTS, sent.unlooped as f64);
     let group = Group::of(&cx.get(GROUP), &curves)?;
+    cx.publish(EMPTY_GROUP, group::is_empty(group.as_ref()));
     let felt = felt(cx, &curves, group.as_ref(), &controls, &sent, [!full, shears])?;
     let incoming = curves.get(ENVELOPE);
     let wanted = cx.wants(GUST);

@@ -52,8 +52,8 @@ params! { PARAMS:
         .at_least(0.0).soft(0.0, 4.0).when(|params| params.get(DISTANCE) > 0.0);
     SMOOTH: Param<f32> = Param::float("smooth", 0.0,
         "Softens the edge of the lee, so that shelter does not pop as the wind turns: each CV looks upwind through a \
-         cone instead of along a line, and is sheltered by the fraction of the cone that is covered. 0 is a line, 1 a \
-         cone with a half angle of 0.1 radians; a cone costs more.")
+         cone instead of along a line, and is sheltered by the fraction of the cone that is covered, to 0.03 where \
+         surfaces lie behind one another. 0 is a line, 1 a cone with a half angle of 0.1 radians; a cone costs more.")
         .within(0.0, 1.0);
     SKIN_GAP: Param<f32> = Param::float("skin_gap", 0.0,
         "A face whose plane is this close to a CV does not shelter it, because the CV lies on that face. 0 only allows \
@@ -70,11 +70,12 @@ const OUT: Output = Output::like("curves", &CURVES, "The curves, with less wind 
 metrics! { METRICS:
     SHELTERED = Metric::new("sheltered_curves", Unit::None, "Curves that are at least partly sheltered.");
     RAYS = Metric::new("rays", Unit::None, "Rays, or cones, that were cast: one per CV.");
+    EMPTY_GROUP = group::EMPTY;
 }
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Shielding",
-    2,
+    3,
     "Reduces the wind for curves in the lee of a collider. Each CV looks upwind; the fraction of a curve's CVs that \
      see a collider is written to `shielded` and scales the curve's `envelope` down. Place this node before \
      Curve_Wind, on curves that are not yet bent.",
@@ -111,6 +112,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
     let amount = cx.get(SHIELD).value;
     let looks = amount > 0.0 || cx.wants(SHIELDED);
     let group = Group::of(&cx.get(GROUP), &curves)?;
+    cx.publish(EMPTY_GROUP, group::is_empty(group.as_ref()));
     if !looks && !cx.wants(SHELTER) {
         cx.publish(SHELTERED, 0.0);
         cx.publish(RAYS, 0.0);

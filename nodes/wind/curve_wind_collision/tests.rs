@@ -235,6 +235,46 @@ fn outside_a_group_curves_keep_their_bits() {
     }
 }
 
+/// Roots that are not those of `rest`, a large `offset_root` and an empty group are told.
+#[test]
+fn roots_off_rest_large_lifts_and_empty_groups_are_metrics() {
+    let standing = || curve(&[[0.0, 0.5, 0.0], [0.0, 1.5, 0.0]]);
+    let over_floor =
+        |curves: Geometry| bench(&NODE).input(CURVES, curves).input(REST, standing()).input(COLLIDERS, floor(0.0));
+    let down = |by: f32| curve(&[[0.0, 0.5 - by, 0.0], [0.6, -0.3, 0.0]]);
+    for (by, off) in [(0.0, 0.0), (5e-5, 0.0), (3e-4, 1.0), (0.5, 1.0)] {
+        let out = over_floor(down(by)).cook();
+        assert!((out.metrics["roots_apart"] - f64::from(by)).abs() < 1e-7, "{by}: {}", out.metrics["roots_apart"]);
+        assert_eq!(out.metrics["roots_off"], off, "{by}");
+        assert!((out.metrics["root_lift"] - 1e-4).abs() < 1e-9, "{}", out.metrics["root_lift"]);
+    }
+    let far = laid_down().input(COLLIDERS, floor(0.0)).set(OFFSET_ROOT, 0.2.into()).cook();
+    assert!((far.metrics["root_lift"] - 0.2).abs() < 1e-6, "{}", far.metrics["root_lift"]);
+    for (row, empty) in [(0, 1.0), (1, 0.0)] {
+        let mut curves = Component::curves(vec![2], vec![[0.0, 0.5, 0.0], [0.6, -0.3, 0.0]]).unwrap();
+        curves.set(Attr::<i32>::element("some"), vec![row]).unwrap();
+        let out = over_floor(curves.into()).set(GROUP, "some".into()).cook();
+        assert_eq!(out.metrics["empty_group"], empty);
+    }
+}
+
+/// A curve of width 0.1 whose root lies nearer to the floor than half of that, and one that `blend` leaves nearer.
+#[test]
+fn curves_nearer_than_half_their_width_are_counted() {
+    let bench = |height: f32, blend: f32| {
+        let goal = curve(&[[0.0, height, 0.0], [0.9, 0.02, 0.0], [1.8, 0.02, 0.0]]);
+        let rest = curve(&[[0.0, height, 0.0], [0.0, height + 0.9, 0.0], [0.0, height + 1.8, 0.0]]);
+        let bench = bench(&NODE).input(CURVES, goal).input(REST, rest).input(COLLIDERS, floor(0.0));
+        bench.set(WIDTH, 0.1.into()).set(OFFSET_ROOT, 0.0.into()).set(BLEND, blend.into()).cook()
+    };
+    let counts = |out: &conformance::BenchResult| ["near_roots", "too_near"].map(|name| out.metrics[name]);
+    assert_eq!(counts(&bench(0.3, 1.0)), [0.0, 0.0]);
+    assert_eq!(counts(&bench(0.04, 1.0)), [1.0, 0.0]);
+    let left = bench(0.3, 0.1);
+    assert_eq!(counts(&left), [0.0, 2.0]);
+    assert!(left.metrics["missing_width"] > 0.3, "{}", left.metrics["missing_width"]);
+}
+
 #[test]
 fn jumps_are_the_share_of_tips_that_move_by_more_than_a_quarter_since_the_sample_before() {
     // Of two upright curves of length 1 over the floor one tip turns by 12°, then 18°: ways of 0.209 and 0.313 lengths.

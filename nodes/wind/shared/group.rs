@@ -20,6 +20,19 @@ pub(crate) const fn param() -> Param<Name> {
     .fixed()
 }
 
+/// The metric of every node that has groups: whether there is one with nothing in it, which [`is_empty`] gives.
+pub(crate) const EMPTY: Metric =
+    Metric::new("empty_group", Unit::None, "1 if the attribute that `group` names is 0 everywhere.").warn_always_above(
+        0.0,
+        "The attribute that `group` names is 0 everywhere, so this node changes nothing. Look at where it is made.",
+    );
+
+/// The value of [`EMPTY`].
+pub(crate) fn is_empty(group: Option<&Group>) -> f64 {
+    let is_empty = group.is_some_and(|group| !group.factors.is_empty() && group.factors.iter().all(|one| *one == 0.0));
+    f64::from(u8::from(is_empty))
+}
+
 /// The attributes that a node reads because params name them, and writes: for [`Node::attributes`].
 pub(crate) fn attributes(params: &Params, names: &[Param<Name>]) -> [AttrNames; 2] {
     let named = names.iter().map(|param| params.get(*param)).filter(|name| !name.is_empty());

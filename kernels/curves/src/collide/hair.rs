@@ -105,6 +105,9 @@ impl Hair<'_> {
         let blended = self.blend(how, &shift);
         reached.crossings_left = if blended { self.crossings(how) } else { reached.unfreed_segments };
         reached.length_error = if blended || fell_back { self.length_error() } else { change.share() };
+        if how.width.value > 0.0 {
+            self.measure_clearance(how, nearby, &mut reached);
+        }
         reached
     }
 
@@ -130,6 +133,7 @@ impl Hair<'_> {
             to = part_way(wanted, &ground.lead_out(&from, wanted, length), &axes.last(), coherence);
             way_out = Some((ground.normal, rest.unwrap_or(*wanted)));
         }
+        let width = f64::from(how.width.at(self.first + k));
         let segment = Segment {
             pivot,
             from,
@@ -137,7 +141,8 @@ impl Hair<'_> {
             axes,
             before: carried.before,
             length,
-            half: 0.5 * f64::from(how.width.at(self.first + k)),
+            half: if width > 0.0 { 0.5 * width + rounding } else { 0.0 },
+            is_round: width > 0.0,
             gap: how.gap_at(self.first + k),
             inner: self.untested(how, k),
             rounding,

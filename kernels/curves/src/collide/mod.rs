@@ -9,6 +9,8 @@
 //! crosses nothing at rest cross no triangle; a curve without contacts keeps the goal's bits; the same bits on every SIMD path and number of threads. Limit: surfaces are
 //! obstacles, not volumes, so a curve wholly inside a surface stays there.
 
+mod capsule;
+mod clearance;
 mod coherence;
 mod coherent_turn;
 mod crossing;
@@ -137,6 +139,12 @@ pub struct Collided {
     pub deepest_overlap: f64,
     /// Largest |length − goal's length| of a segment ÷ curve length, in the written result.
     pub length_error: f64,
+    /// Segments nearer to something than half their width, although their curves are that far away before.
+    pub too_near: u64,
+    /// The largest share of half a width that these lack.
+    pub missing_width: f64,
+    /// Curves whose roots, lifted, are nearer to something than half their width.
+    pub near_roots: u64,
 }
 
 /// Counts and largest values over some curves.
@@ -148,6 +156,9 @@ struct Reached {
     contacts: u64,
     deepest_overlap: f64,
     length_error: f64,
+    too_near: u64,
+    missing_width: f64,
+    near_roots: u64,
 }
 
 impl Reached {
@@ -159,6 +170,9 @@ impl Reached {
             blended_to_rest: self.blended_to_rest + other.blended_to_rest,
             deepest_overlap: self.deepest_overlap.max(other.deepest_overlap),
             length_error: self.length_error.max(other.length_error),
+            too_near: self.too_near + other.too_near,
+            missing_width: self.missing_width.max(other.missing_width),
+            near_roots: self.near_roots + other.near_roots,
         }
     }
 }
@@ -223,6 +237,9 @@ pub fn collide_on(path: Path, starts: &[u32], rest: &[Vec3], goal: &[Vec3], how:
         contacts: reached.contacts,
         deepest_overlap: reached.deepest_overlap,
         length_error: reached.length_error,
+        too_near: reached.too_near,
+        missing_width: reached.missing_width,
+        near_roots: reached.near_roots,
     }
 }
 

@@ -2,8 +2,9 @@
 //!
 //! A triangle intersects the sector's plane in a line segment, here called a piece. Along the part of it inside the
 //! circle the angle seen from the pivot is monotonic, so that part blocks one interval of angles, which its ends give
-//! in closed form. A thick segment is blocked by the triangle's part between two planes at half its thickness, whose outline
-//! is up to five such pieces, and by what is nearer to it than that in the plane: a point at radius r blocks the angles up to
+//! in closed form. A round segment, of a curve with a width, is a capsule (see [`super::capsule`]). One that is thickened
+//! by rounding only is blocked by the triangle's part between two planes at half its thickness, whose outline is up to
+//! five such pieces, and by what is nearer to it than that in the plane: a point at radius r blocks the angles up to
 //! asin(half/r) around it. Where the pivot itself is nearer to a piece than that, as next to a root on the skin, only the end
 //! of the segment is kept away.
 //!
@@ -28,6 +29,8 @@ pub(super) struct Sector {
     pub(super) inner: f64,
     /// Half the thickness; 0 tests the plane itself.
     pub(super) half: f64,
+    /// The length of a capsule, with the rounding of its end; `None` of a segment that is not one.
+    pub(super) capsule: Option<f64>,
     /// Arc length kept from contacts, beyond the thickness.
     pub(super) back: f64,
 }
@@ -77,6 +80,9 @@ impl Sector {
             [true, false] => p[0] * q[1] >= q[0] * p[1] || !over(q),
             [false, true] => q[0] * p[1] >= p[0] * q[1] || !over(p),
         };
+        if let Some(length) = self.capsule {
+            return self.capsule_obstruction(length, corners);
+        }
         let mut found = Obstruction::default();
         if self.half == 0.0 {
             self.pieces(corners, |p, q| {
@@ -92,6 +98,9 @@ impl Sector {
 
     /// Calls `found` with each interval of angles that the triangle blocks.
     pub(super) fn blocked_by(&self, corners: &[DVec3; 3], mut found: impl FnMut(Blocked)) {
+        if let Some(length) = self.capsule {
+            return self.capsule_blocked_by(length, corners, found);
+        }
         if self.half == 0.0 {
             self.pieces(corners, |p, q| found(Blocked::between(p, q)));
             return;
@@ -106,7 +115,7 @@ impl Sector {
 
     /// Calls `found` with the ends of each piece in which the triangle cuts the plane of the turn.
     #[inline(always)]
-    fn pieces(&self, corners: &[DVec3; 3], found: impl FnMut(P2, P2)) {
+    pub(super) fn pieces(&self, corners: &[DVec3; 3], found: impl FnMut(P2, P2)) {
         if let Some(piece) = slice(&self.heights(corners), 0.0, |k| self.flat(&corners[k])) {
             self.within_reach(piece, found);
         }
@@ -208,7 +217,7 @@ impl Sector {
 
 impl Blocked {
     /// The angles of a straight piece between two points, neither at the pivot.
-    fn between(p: P2, q: P2) -> Self {
+    pub(super) fn between(p: P2, q: P2) -> Self {
         let (first, last) = in_order(p, q);
         let (lo, hi) = (angle(first), angle(last));
         // An interval across the opposite direction continues past π.
@@ -221,7 +230,7 @@ impl Blocked {
     }
 
     /// The same interval with `lo` in −π…π.
-    fn wrapped(&self) -> Self {
+    pub(super) fn wrapped(&self) -> Self {
         let turns = match self.lo {
             lo if lo < -std::f64::consts::PI => std::f64::consts::TAU,
             lo if lo > std::f64::consts::PI => -std::f64::consts::TAU,
@@ -242,7 +251,7 @@ impl Obstruction {
     /// Adds the piece between two points, neither at the pivot: as [`Obstruction::add`] of [`Blocked::between`], but finds
     /// only the angles that count.
     #[inline(always)]
-    fn add_piece(&mut self, p: P2, q: P2, back: f64) {
+    pub(super) fn add_piece(&mut self, p: P2, q: P2, back: f64) {
         let ([x, y], [last_x, last_y]) = in_order(p, q);
         // It runs from behind the start to its front, on the side that the turn leaves.
         if y < 0.0 && last_y > 0.0 {
@@ -271,7 +280,7 @@ impl Obstruction {
 
     /// Adds a contact at an angle, at a distance from the pivot.
     #[inline(always)]
-    fn stop_at(&mut self, angle: f64, radius: f64, back: f64) {
+    pub(super) fn stop_at(&mut self, angle: f64, radius: f64, back: f64) {
         let angle = (angle - back / radius).max(0.0);
         self.stop = Some(self.stop.map_or(angle, |least| least.min(angle)));
     }

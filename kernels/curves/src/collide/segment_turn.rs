@@ -29,6 +29,8 @@ pub(super) struct Segment<'a> {
     pub(super) length: f64,
     /// Half its thickness.
     pub(super) half: f64,
+    /// Whether its curve has a width: it is a capsule.
+    pub(super) is_round: bool,
     /// Arc length kept from contacts.
     pub(super) gap: f64,
     /// Length next to the pivot that is not tested.
@@ -90,6 +92,7 @@ impl Segment<'_> {
             reach: self.length + self.half + self.rounding,
             inner: self.inner,
             half: self.half,
+            capsule: self.is_round.then_some(self.length + self.rounding),
             back: self.gap,
         }
     }

@@ -10,9 +10,10 @@
 //! Where shelter fades with distance, the value at the centre has the weight of its distance and each edge that of its
 //! nearest point: exact for a surface across the wind that covers the disc, continuous always.
 //!
-//! Front and back faces are counted separately; the larger mean is taken, at most 1. That is exact if the visible
-//! surface is one layer or covers the whole disc, and an upper bound if layers overlap partly.
+//! Front and back faces are counted separately. If each is at most one layer the larger mean is taken: exact. What
+//! layers behind one another add too much is taken off, to 0.03 (see [`super::layers`]).
 
+use super::layers::{Edge, Layers};
 use super::rays::{Seen, beside};
 use super::views::View;
 use super::{Fade, Obstacle, Reach};
@@ -109,24 +110,37 @@ impl DistanceWeight for Fade {
 #[inline(always)]
 fn body<W: DistanceWeight>(obstacles: &[Obstacle], views: &[View], fade: W, cone: f32, covered: &mut [f32]) {
     let (sine, cosine) = trig::sin_cos(cone);
+    let mut layers = Layers::default();
     for (view, covered) in views.iter().zip(covered) {
+        layers.clear();
         let mut sums = [F32x16::splat(0.0); 2];
         for obstacle in obstacles {
             let gap = view.gap.at(obstacle.size);
             let farthest = fade.farthest(view.reach);
             let cone = Cone { at: view.at, slope: sine / cosine, end: view.reach, fade, farthest, gap };
-            cone.look(obstacle, &mut sums);
+            cone.look(obstacle, &mut sums, &mut layers);
         }
         let (mut front, mut back) = (0.0, 0.0);
         for lane in 0..LANES {
             front += sums[0].0[lane];
             back += sums[1].0[lane];
         }
-        let most = if front > back { front } else { back };
-        let share = (most - ROUNDING) / (1.0 - 2.0 * ROUNDING);
+        let share = (layers.covered([front, back]) - ROUNDING) / (1.0 - 2.0 * ROUNDING);
         let share = if share > 0.0 { share } else { 0.0 };
         *covered = if share < 1.0 { share } else { 1.0 };
     }
+}
+
+/// An edge as seen in a cone.
+struct SeenEdge {
+    /// Its contribution to the mean over the disc.
+    share: f32,
+    /// Whether a part of it is inside the disc.
+    is_met: bool,
+    /// The ends of that part, in radii of the disc.
+    ends: [[f32; 2]; 2],
+    /// How much a surface at its distance counts.
+    weight: f32,
 }
 
 /// A cone upwind of a CV.
@@ -145,12 +159,12 @@ struct Cone<W> {
 impl<W: DistanceWeight> Cone<W> {
     /// Adds how many times the mesh covers the disc with front and with back faces, on average; spread over the lanes.
     #[inline(always)]
-    fn look(&self, obstacle: &Obstacle, sums: &mut [F32x16; 2]) {
+    fn look(&self, obstacle: &Obstacle, sums: &mut [F32x16; 2], layers: &mut Layers) {
         let Some(edges) = &obstacle.edges else { return };
         let tree = &obstacle.tree;
         for (block, lanes) in tree.walk(self) {
             let (corners, thirds) = (&tree.blocks()[block].corners, edges.of_block(block));
-            self.add(&self.seen(corners), &self.seen(thirds), lanes, sums);
+            self.add(&self.seen(corners), &self.seen(thirds), lanes, sums, layers);
         }
     }
 
@@ -172,8 +186,16 @@ impl<W: DistanceWeight> Cone<W> {
 
     /// Adds sixteen triangles.
     #[inline(always)]
-    fn add(&self, corners: &[Lanes<3>; 3], thirds: &[Lanes<3>; 3], lanes: u16, sums: &mut [F32x16; 2]) {
+    fn add(
+        &self,
+        corners: &[Lanes<3>; 3],
+        thirds: &[Lanes<3>; 3],
+        lanes: u16,
+        sums: &mut [F32x16; 2],
+        layers: &mut Layers,
+    ) {
         let mut count = F32x16::splat(0.0);
+        let mut at_centre = 0;
         let (mut front, mut open) = ([false; LANES], [[false; LANES]; 3]);
         for lane in 0..LANES {
             let at @ [a, b, c] = [get(&corners[0], lane), get(&corners[1], lane), get(&corners[2], lane)];
@@ -185,6 +207,7 @@ impl<W: DistanceWeight> Cone<W> {
             let inside = ((x & y & z) | !(x | y | z)) & (seen.towards > 0.0);
             let weight = self.weight(seen.towards / seen.across);
             count.0[lane] = if inside & counts { weight } else { 0.0 };
+            at_centre |= u16::from(inside & counts) << lane;
 
             for side in 0..3 {
                 let (from, to) = (at[side], at[(side + 1) % 3]);
@@ -194,17 +217,36 @@ impl<W: DistanceWeight> Cone<W> {
                 open[side][lane] = counts & !continues;
             }
         }
+        while at_centre != 0 {
+            let lane = at_centre.trailing_zeros() as usize;
+            at_centre &= at_centre - 1;
+            layers.add_centre(front[lane], count.0[lane]);
+        }
         for side in 0..3 {
             let mut any = false;
             for lane in 0..LANES {
                 any |= open[side][lane];
             }
             if any {
+                let mut meets = 0;
+                let mut seen = [F32x16::splat(0.0); 6];
                 for lane in 0..LANES {
                     let (from, to) = (get(&corners[side], lane), get(&corners[(side + 1) % 3], lane));
                     let edge = self.edge(from, to);
-                    let edge = if front[lane] { edge } else { -edge };
-                    count.0[lane] += if open[side][lane] { edge } else { 0.0 };
+                    let share = if front[lane] { edge.share } else { -edge.share };
+                    count.0[lane] += if open[side][lane] { share } else { 0.0 };
+                    meets |= u16::from(edge.is_met & open[side][lane]) << lane;
+                    let [[ax, ay], [bx, by]] = edge.ends;
+                    let change = if is_left(from, to) == front[lane] { -1.0 } else { 1.0 };
+                    for (seen, number) in seen.iter_mut().zip([ax, ay, bx, by, change, edge.weight]) {
+                        seen.0[lane] = number;
+                    }
+                }
+                while meets != 0 {
+                    let lane = meets.trailing_zeros() as usize;
+                    meets &= meets - 1;
+                    let [ax, ay, bx, by, change, weight] = seen.map(|seen| seen.0[lane]);
+                    layers.add_edge(front[lane], Edge { from: [ax, ay], to: [bx, by], change, weight });
                 }
             }
         }
@@ -235,7 +277,7 @@ impl<W: DistanceWeight> Cone<W> {
     /// Contribution of an edge to the mean over the disc: an integral over the part of it inside the disc, as seen from
     /// the centre. The surface is on the left of the edge.
     #[inline(always)]
-    fn edge(&self, from: Vec3, to: Vec3) -> f32 {
+    fn edge(&self, from: Vec3, to: Vec3) -> SeenEdge {
         let (start, end) = self.near_the_cone(from, to);
         let along = sub(to, from);
         // An end that is not clipped keeps its bits, since the next edge begins there.
@@ -265,10 +307,11 @@ impl<W: DistanceWeight> Cone<W> {
         let nearest = if nearest < leaves { nearest } else { leaves };
         let distance = 1.0 / ((1.0 - nearest) / p[2] + nearest / q[2]);
 
-        let share = (twice_area - angle) * (0.5 / PI) * self.weight(distance);
+        let weight = self.weight(distance);
+        let share = (twice_area - angle) * (0.5 / PI) * weight;
         let share = if is_left(from, to) { share } else { -share };
         let sound = in_front & (inside > 0.0) & (square > 0.0) & (enters < leaves) & (share.abs() <= 1.0);
-        if sound { share } else { 0.0 }
+        SeenEdge { share: if sound { share } else { 0.0 }, is_met: sound, ends: [[ax, ay], [bx, by]], weight }
     }
 
     /// The interval of an edge, 0…1, inside the pyramid around the cone; start ≥ end if it is outside.

@@ -6,7 +6,7 @@
 //!
 //! Guarantees: rays are exact up to the rounding of positions and [`Shield::skin_gap`], do not pass between triangles
 //! that share points, and are stopped by either side of a face. The covered fraction of a cone is a continuous function
-//! of the wind. The same bits on every SIMD path and number of threads; finite for any input.
+//! of the wind, but for steps of at most 1/16 where layers overlap (see [`layers`]). The same bits on every SIMD path and number of threads; finite for any input.
 //!
 //! Shelter may fade with the distance of what is hit ([`Shield::distance`]); of several hits the nearest counts.
 //!
@@ -17,6 +17,7 @@
 mod cone;
 mod edges;
 mod frame;
+mod layers;
 mod rays;
 mod views;
 

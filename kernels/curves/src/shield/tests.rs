@@ -393,4 +393,83 @@ mod cones {
         assert!(largest < 1.5e-3, "{largest}");
         assert_eq!((least, most), (0.0, 1.0));
     }
+
+    /// Several walls as one mesh, each at an x, from a y to a y, over z = −9…9.
+    fn walls(of: &[[f32; 3]]) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+        let (mut points, mut triangles) = (Vec::new(), Vec::new());
+        for [x, low, high] in of {
+            let first = points.len() as u32;
+            points.extend([[*x, *low, -9.0], [*x, *high, -9.0], [*x, *high, 9.0], [*x, *low, 9.0]]);
+            triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        }
+        (points, triangles)
+    }
+
+    /// Half-planes behind one another count once: the nearer edges of each decide, in one mesh and in several, whichever way
+    /// they are wound. In closed form, the share beyond a line at a distance of d radii.
+    #[test]
+    fn walls_behind_one_another_count_once() {
+        let slope = libm::tan(0.1) as f32;
+        let beyond = |d: f32| {
+            let d = f64::from(d.clamp(-1.0, 1.0));
+            (libm::acos(d) - d * (1.0 - d * d).sqrt()) / std::f64::consts::PI
+        };
+        let how = Shield { cone: 0.1, offset: 1e6.into(), ..STILL };
+        for edges in [[0.0, 0.0], [0.0, 0.5], [-0.3, 0.2], [-0.7, -0.7], [0.6, -0.1], [0.9, 0.8]] {
+            // Seen from x = 0 in wind along x: walls at 1 and 2 m upwind, which reach down to their edges.
+            let at = |n: usize| [-1.0 - n as f32, edges[n] * slope * (1.0 + n as f32), 9.0];
+            let expected = beyond(edges[0].min(edges[1]));
+            let one = walls(&[at(0), at(1)]);
+            let found = shares(&[[0.0; 3]], &one, &how)[0];
+            assert!((f64::from(found) - expected).abs() < 0.03, "{edges:?}: {found} for {expected}");
+            let (near, mut far) = (walls(&[at(0)]), walls(&[at(1)]));
+            for _ in 0..2 {
+                let colliders = [Collider::of(&near.0, &near.1), Collider::of(&far.0, &far.1)];
+                let found = shield(&[0, 1], &[[0.0; 3]], &colliders, &how)[0];
+                assert!((f64::from(found) - expected).abs() < 0.03, "{edges:?}: {found} for {expected}");
+                far.1.iter_mut().for_each(|corners| corners.swap(0, 1));
+            }
+        }
+        // From opposite sides: what is covered by either.
+        let two = walls(&[[-1.0, 0.3 * slope, 9.0], [-2.0, -9.0, -0.2 * slope]]);
+        let expected = beyond(0.3) + beyond(0.1);
+        let found = shares(&[[0.0; 3]], &two, &how)[0];
+        assert!((f64::from(found) - expected).abs() < 1e-4, "{found} for {expected}");
+    }
+
+    /// Of layers at several distances the nearest counts, where shelter fades.
+    #[test]
+    fn of_fading_layers_the_nearest_counts() {
+        let how = Shield { cone: 0.1, offset: 1e6.into(), distance: 4.0, ..STILL };
+        let all = walls(&[[-1.0, -9.0, 9.0], [-2.0, -9.0, 9.0], [-3.5, -9.0, 9.0]]);
+        assert!((shares(&[[0.0; 3]], &all, &how)[0] - 0.75).abs() < 2e-3);
+        // The nearer one covers half, the farther one all.
+        let half = walls(&[[-1.0, 0.0, 9.0], [-2.0, -9.0, 9.0]]);
+        let found = shares(&[[0.0; 3]], &half, &how)[0];
+        assert!((found - 0.625).abs() < 5e-3, "{found}");
+    }
+
+    /// A wall that moves up behind another and a row of slats that turns change the share evenly.
+    #[test]
+    fn overlapping_layers_are_continuous() {
+        let how = Shield { cone: 0.1, offset: 1e6.into(), ..STILL };
+        let slats: Vec<[f32; 3]> =
+            (0..12).map(|k| [-1.0 - 0.3 * k as f32, -0.4 + 0.06 * k as f32, -0.35 + 0.07 * k as f32]).collect();
+        let mesh = walls(&slats);
+        let mut before: Option<f32> = None;
+        let (mut largest, mut least, mut most) = (0.0_f32, 1.0_f32, 0.0_f32);
+        for step in 0..8000 {
+            let angle = f64::from(step) * 1e-4 - 0.4;
+            let wind = [libm::cos(angle), libm::sin(angle), 0.05 * libm::sin(5.0 * angle)];
+            let now = shares(&[[0.0; 3]], &mesh, &Shield { wind, ..how })[0];
+            if let Some(before) = before {
+                largest = largest.max((now - before).abs());
+            }
+            (least, most) = (least.min(now), most.max(now));
+            before = Some(now);
+        }
+        // Four edges at a time at 2 ÷ (π · 0.1) of 1.2e-4 rad.
+        assert!(largest < 6e-3, "{largest}");
+        assert!(least < 0.1 && most > 0.5, "{least} {most}");
+    }
 }

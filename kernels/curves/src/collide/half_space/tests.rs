@@ -89,6 +89,7 @@ fn what_a_half_space_frees_the_trees_free_too() {
                 before: DVec3::zeros(),
                 length,
                 half: if case % 4 == 0 { size * number(key.of(8), 0.0, 0.02) } else { 0.0 },
+                is_round: case % 4 == 0,
                 gap,
                 inner: 0.0,
                 rounding: 1.2e-7 * (size + length),

@@ -4,7 +4,7 @@ use super::*;
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_6, PI};
 
 fn sector(u: DVec3, v: DVec3, reach: f64) -> Sector {
-    Sector { pivot: DVec3::zeros(), u, v, n: u.cross(&v), reach, inner: 0.0, half: 0.0, back: 0.0 }
+    Sector { pivot: DVec3::zeros(), u, v, n: u.cross(&v), reach, inner: 0.0, half: 0.0, capsule: None, back: 0.0 }
 }
 
 fn first(sector: &Sector, corners: &[DVec3; 3]) -> Option<f64> {
