@@ -5,11 +5,16 @@
 //! particle would be kept there, so the skin stays hooked to it. The triangle through which it went in is therefore
 //! kept, and moves with the obstacle: what lies there draws the particle back until it is out on that side.
 //!
+//! Skin that was squeezed around the rim of a plate went in nowhere. It is on the wrong side where all its edges to the larger
+//! part of the skin go through the obstacle, and went in where one of them does.
+//!
 //! Limits: open obstacles have no wrong side; there is no way back below the ground; a body of which most particles are beyond an obstacle is left there.
 
-use super::{CollisionScene, ReleasedElements, SkinObstaclePair, vertex};
+use super::surface::Moment;
+use super::{CollisionScene, OverlapPartner, ReleasedElements, SkinObstaclePair, vertex};
 use crate::mass_spring::ContactQuery;
 use crate::tets::Enclosure;
+use numerics::pieces::pieces;
 use numerics::swept;
 use numerics::vector::DVec3;
 use serde::{Deserialize, Serialize};
@@ -49,6 +54,7 @@ impl CollisionScene<'_> {
                         own.extend(back.map(|back| CaughtParticle { obstacle, particle: *particle, face: back.face }));
                     }
                 });
+                self.add_severed((index, obstacle), to, &mut own);
                 if 2 * self.beyond(obstacle, to, &own) <= skin.touching.len() {
                     caught.extend(own);
                 }
@@ -56,6 +62,47 @@ impl CollisionScene<'_> {
         }
         caught.sort_unstable();
         caught
+    }
+
+    /// Adds the particles on the surface of a skin whose edges to its largest part all go through an obstacle: this part is
+    /// on the right side.
+    fn add_severed(&self, (skin_index, obstacle): (usize, usize), x: &[[f64; 3]], caught: &mut Vec<CaughtParticle>) {
+        // What is being pushed out goes through for now.
+        if self.separating(skin_index, OverlapPartner::Obstacle(obstacle)).is_some() {
+            return;
+        }
+        let cut = self.cut_edges(skin_index, obstacle, x);
+        if cut.is_empty() {
+            return;
+        }
+        let surface = &self.skins[skin_index].surface;
+        let mut is_cut = vec![false; surface.edges.len()];
+        cut.iter().for_each(|(edge, _)| is_cut[*edge] = true);
+        let whole = surface.edges.iter().zip(&is_cut).filter(|(_, cut)| !**cut).map(|(edge, _)| edge.ends);
+        let part_of = pieces(x.len(), whole);
+        let mut sizes = vec![0_usize; x.len()];
+        surface.vertices.iter().for_each(|vertex| sizes[part_of[*vertex as usize] as usize] += 1);
+        let Some(largest) = (0..x.len()).rev().max_by_key(|part| sizes[*part]) else { return };
+        // The triangle through which each part went in.
+        let mut entries: Vec<Option<u32>> = vec![None; x.len()];
+        for (edge, first) in &cut {
+            let [a, b] = surface.edges[*edge].ends.map(|end| part_of[end as usize] as usize);
+            for (own, other, face) in [(a, b, first[1]), (b, a, first[0])] {
+                if own != largest && other == largest {
+                    entries[own].get_or_insert(face);
+                }
+            }
+        }
+        let own = &self.obstacles[obstacle];
+        let (points, known) = (own.at(1.0), caught.len());
+        for particle in &surface.vertices {
+            let Some(face) = entries[part_of[*particle as usize] as usize] else { continue };
+            let is_known = caught[..known].iter().any(|caught| caught.particle == *particle);
+            let back = vertex::way_back(&own.surface, &Moment::of(&points), face, DVec3::from(x[*particle as usize]));
+            if let Some(back) = back.filter(|back| !is_known && !self.is_below_ground(back.point)) {
+                caught.push(CaughtParticle { obstacle, particle: *particle, face: back.face });
+            }
+        }
     }
 
     /// Whether a point is below the ground by more than the distance to keep.

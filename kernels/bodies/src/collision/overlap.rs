@@ -9,7 +9,8 @@
 //! Points on the surface of a side are tested a little below it, so that surfaces that coincide count where what is
 //! below them overlaps.
 //!
-//! Limit: bodies of which only edges cross, with no point of one inside the other, are not seen.
+//! Limit: bodies of which only edges cross, with no point of one inside the other, are not pushed apart;
+//! [`CollisionScene::crossings`] finds them.
 
 use super::obstacle::narrow;
 use super::surface::{Moment, TriangleSurface};
@@ -26,7 +27,7 @@ use std::collections::BTreeMap;
 const TOUCHING: f64 = 0.01;
 /// Distance in gaps below their surface at which its points are tested for overlap. In a corner of a box, which is tested
 /// along its diagonal, that is still deeper than a gap below each face.
-const BELOW: f64 = 2.0;
+pub(super) const BELOW: f64 = 2.0;
 /// Share of its height above the ground by which a body is squeezed against the ground, if that is the shortest way out.
 const SQUEEZED: f64 = 0.25;
 
@@ -429,7 +430,7 @@ fn add_overlap(
 }
 
 /// Points, with those of a surface moved below it by a distance.
-fn below(points: &[[f64; 3]], surface: &TriangleSurface, distance: f64) -> Vec<[f64; 3]> {
+pub(super) fn below(points: &[[f64; 3]], surface: &TriangleSurface, distance: f64) -> Vec<[f64; 3]> {
     let (at, mut below) = (Moment::of(points), points.to_vec());
     let mut is_moved = vec![false; points.len()];
     for (corners, face) in surface.triangles.iter().zip(0..) {

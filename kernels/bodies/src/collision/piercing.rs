@@ -4,11 +4,14 @@
 
 use super::obstacle::narrow;
 use super::surface::{Edge, Moment, TriangleSurface};
-use super::{CollisionScene, TASK};
+use super::{CollisionScene, Overlap, OverlapPartner, TASK, overlap};
 use numerics::parallel;
 use numerics::swept::{self, SweptBoxTree, SweptElements};
 use numerics::tree::{Cuboid, TriangleTree};
 use numerics::vector::DVec3;
+
+/// Positions of points, and their boxes.
+type Places<'a> = (&'a [[f64; 3]], &'a [Cuboid]);
 
 /// A surface at one time.
 #[derive(Clone, Copy)]
@@ -69,6 +72,82 @@ impl CollisionScene<'_> {
             }
         }
         deepest
+    }
+}
+
+impl CollisionScene<'_> {
+    /// The pairs of a skin and a closed obstacle, or another skin, of which edges go through the other although no point is
+    /// inside, so that they are not among `overlaps`: at the start of the frame, with contact points at `x`. Surfaces are tested
+    /// a little below where they are, so that those that coincide count where what is below both crosses.
+    pub fn crossings(&self, x: &[[f64; 3]], overlaps: &[Overlap]) -> Vec<(usize, OverlapPartner)> {
+        let boxes = swept::swept_boxes(&[x]);
+        let mut found = Vec::new();
+        let mut test = |pair: (usize, OverlapPartner),
+                        sides: [(&TriangleSurface, &SweptElements<3>, Places<'_>); 2],
+                        gap| {
+            let known = overlaps.iter().any(|overlap| (overlap.skin, overlap.partner) == pair);
+            let bounds = sides.map(|(surface, _, (_, boxes))| swept::bounds_of_finite(&surface.vertices, boxes));
+            if known || !sides.iter().all(|side| side.0.closed) || !swept::overlap(&bounds[0], &bounds[1]) {
+                return;
+            }
+            let points = sides.map(|(surface, _, (points, _))| overlap::below(points, surface, overlap::BELOW * gap));
+            let boxes = [0, 1].map(|own: usize| swept::swept_boxes(&[&points[own]]));
+            let still = |own: usize| {
+                let (surface, faces, _) = sides[own];
+                Still { surface, points: &points[own], boxes: &boxes[own], faces }
+            };
+            let goes_through = |own: usize| {
+                let edges: Vec<&Edge> = sides[own].0.edges.iter().collect();
+                still(own).reaches(&edges, &still(1 - own)) > 0.0
+            };
+            if goes_through(0) || goes_through(1) {
+                found.push(pair);
+            }
+        };
+        for (index, skin) in self.skins.iter().enumerate() {
+            let own = (&skin.surface, &skin.faces, (x, &boxes[..]));
+            for (at, obstacle) in self.obstacles.iter().enumerate() {
+                let points = obstacle.at(0.0);
+                let boxes = swept::swept_boxes(&[&points]);
+                let other = (&obstacle.surface, &obstacle.faces, (&points[..], &boxes[..]));
+                test((index, OverlapPartner::Obstacle(at)), [own, other], obstacle.thickness);
+            }
+            let Some(params) = self.body_contact else { continue };
+            for (next, other) in self.skins.iter().enumerate().skip(index + 1) {
+                let other = (&other.surface, &other.faces, (x, &boxes[..]));
+                test((index, OverlapPartner::Skin(next)), [own, other], params.thickness);
+            }
+        }
+        found
+    }
+
+    /// The edges of a skin that go through the surface of an obstacle, with contact points at `x` and the obstacle at the end
+    /// of the frame: by index, with the triangles that they meet first from either end.
+    pub(super) fn cut_edges(&self, skin: usize, obstacle: usize, x: &[[f64; 3]]) -> Vec<(usize, [u32; 2])> {
+        let (skin, obstacle) = (&self.skins[skin], &self.obstacles[obstacle]);
+        let points = obstacle.at(1.0);
+        let [own, boxes] = [swept::swept_boxes(&[x]), swept::swept_boxes(&[&points])];
+        let tree = obstacle.faces.sweep(&boxes, 0.0);
+        if !swept::overlap(&swept::bounds_of_finite(&skin.surface.vertices, &own), &tree.bounds) {
+            return Vec::new();
+        }
+        let at = Moment::of(&points);
+        let cut = |edge: &Edge, faces: &mut Vec<u32>| {
+            tree.overlapping(&swept::bounds_of(&edge.ends, &own), faces);
+            let ends = edge.ends.map(|end| DVec3::from(x[end as usize]));
+            let met = |face: &u32| Some((crossing(ends, obstacle.surface.corners(&at, *face))?.0, *face));
+            let mut met: Vec<(f64, u32)> = faces.iter().filter_map(met).collect();
+            met.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            Some([met.first()?.1, met.last()?.1])
+        };
+        let indices: Vec<usize> = (0..skin.surface.edges.len()).collect();
+        let parts = parallel::map(indices.chunks(TASK), |_, indices| {
+            let mut faces = Vec::new();
+            let found =
+                indices.iter().filter_map(|index| Some((*index, cut(&skin.surface.edges[*index], &mut faces)?)));
+            found.collect::<Vec<_>>()
+        });
+        parts.into_iter().flatten().collect()
     }
 }
 

@@ -40,6 +40,8 @@ fn a_particle_that_went_through_a_plate_is_drawn_back_to_its_side() {
     let [contact] = contacts[..] else { panic!("{contacts:?}") };
     assert_eq!((contact.points[0], contact.normal), (0, [0.0, -1.0, 0.0]));
     assert!((contact.offset - (-0.2 - 0.04)).abs() < 1e-12, "{contact:?}");
+    let around = CollisionScene { caught: &[], ..scene }.caught_after(&from, &from);
+    assert!(below(&around), "it came around the rim, its edges go through: {around:?}");
     let kept = |to: [f64; 3]| !scene.caught_after(&from, &moved(to)).is_empty();
     assert!(kept([0.03, 0.21, 0.02]) && kept([-0.2, 0.4, 0.02]));
     assert!(!kept([0.03, 0.19, 0.02]), "it is back");
