@@ -256,6 +256,11 @@ metrics! { METRICS:
         "The wire of one body of the first such pair, counted from 0; −1 if there is none.");
     STARTED_IN_BODIES_OTHER = Metric::new("started_in_bodies_other", Unit::None,
         "The wire of the other; −1 if there are none.");
+    STARTED_CROSSING = Metric::new("started_crossing", Unit::None,
+        "Pairs of bodies, or of a body and a closed collider, that go through each other when the simulation starts \
+         although no point of one is inside the other, as crossed bars.")
+        .warn_above(0.0, "Bodies start crossed with each other or with a collider, with no point of one inside the other. \
+            They are not pushed apart. Move them apart at `start_frame`, or give their surfaces shorter edges.");
     STARTED_IN_COLLIDERS = Metric::new("started_in_colliders", Unit::None,
         "Pairs of a body and a closed collider, or the ground, that are inside each other when the simulation starts.")
         .warn_above(0.0, "Bodies start inside a collider or below the ground, and are pushed out the shortest way over 12 \
@@ -321,7 +326,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
-    11,
+    12,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
      other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
      pins hold them. `stiffness` has the same effect at any mesh resolution as long as tets are about as wide as long \

@@ -20,10 +20,10 @@ use super::{
     DEEPEST_PENETRATION, DRAG, FRICTION, GOAL_DISTANCE, GOAL_ON, GOALS, GRAVITY, GROUND, GROUND_HEIGHT, IDLE_PINS,
     IDLE_PINS_POINT, IDLE_PINS_WIRE, INITIAL_VELOCITY, INTEGRATOR, KEEP_DENTS, LET_GO, LOST_SHARE, NOT_PUSHED_OUT,
     PINNED, PINS, PLASTIC_CREEP, PLASTIC_WORK, PLASTIC_YIELD, POINTS_INSIDE, RESET_ENERGY, RESET_FRAMES,
-    RESET_TO_GOALS, SELF_COLLISION, SEPARATION_FRAMES, SOFTEST_DIRECTION, START_FRAME, STARTED_IN_BODIES,
-    STARTED_IN_BODIES_OTHER, STARTED_IN_BODIES_WIRE, STARTED_IN_COLLIDERS, STARTED_INSIDE, STIFFEST_DIRECTION,
-    STIFFEST_DIRECTION_WIRE, STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS, TIME_SCALE, TOLERANCE,
-    VOLUME,
+    RESET_TO_GOALS, SELF_COLLISION, SEPARATION_FRAMES, SOFTEST_DIRECTION, START_FRAME, STARTED_CROSSING,
+    STARTED_IN_BODIES, STARTED_IN_BODIES_OTHER, STARTED_IN_BODIES_WIRE, STARTED_IN_COLLIDERS, STARTED_INSIDE,
+    STIFFEST_DIRECTION, STIFFEST_DIRECTION_WIRE, STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS,
+    TIME_SCALE, TOLERANCE, VOLUME,
 };
 use super::{carried, obstacles, pins};
 
@@ -175,6 +175,8 @@ impl Run {
         scene.friction = friction_mask.as_deref();
         if is_start {
             let (overlaps, inside) = scene.overlaps(&setup.contact_points(&self.state.positions));
+            let crossings = scene.crossings(&setup.contact_points(&self.state.positions), &overlaps);
+            self.metrics.set(STARTED_CROSSING, crossings.len() as f64);
             self.metrics.set(STARTED_INSIDE, inside as f64);
             set_overlaps(&setup, &overlaps, &mut self.metrics);
             self.metrics.set(CARRIED_OUTSIDE, setup.carried_outside() as f64);
@@ -354,7 +356,8 @@ impl Run {
 }
 
 /// Metrics of the start that later frames publish, too.
-const AT_START: [Metric; 9] = [
+const AT_START: [Metric; 10] = [
+    STARTED_CROSSING,
     STARTED_INSIDE,
     STARTED_IN_BODIES,
     STARTED_IN_BODIES_WIRE,

@@ -34,6 +34,21 @@ fn particles_that_start_inside_something_are_counted_at_every_frame() {
     assert_eq!((inside(two(0.2)), inside(two(0.06).set(BODY_COLLISION, false))), (0.0, 0.0));
 }
 
+/// Bars of 0.1 × 0.1 × 0.5 m through each other's middle, with cells of 0.1 m: all points lie on the other's faces or outside.
+#[test]
+fn bars_that_start_crossed_are_said_from_the_first_frame() {
+    let bar = |cells: [usize; 3], size: [f32; 3]| block(cells, size.map(|size| -0.5 * size), size);
+    let crossed = |away: f32| {
+        let mut second = bar([1, 1, 5], [0.1, 0.1, 0.5]);
+        let moved = second.positions().iter().map(|[x, y, z]| [*x, *y + away, *z]).collect();
+        second.set(P, moved).unwrap();
+        let bench = simulating(bar([5, 1, 1], [0.5, 0.1, 0.1])).input(BODIES, second).set(GRAVITY, [0.0; 3]);
+        bench.frames([1, 2]).iter().map(|frame| frame.metrics["started_crossing"]).collect::<Vec<_>>()
+    };
+    assert_eq!(crossed(0.0), [1.0, 1.0]);
+    assert_eq!(crossed(0.1), [0.0, 0.0], "one lies on the other");
+}
+
 /// Two cubes of 0.1 m, the second 50 mm inside the first along x. They keep 1 mm, so each moves 51/24 mm a frame.
 #[test]
 fn bodies_that_start_inside_each_other_come_apart_evenly_in_twelve_frames() {
