@@ -10,6 +10,7 @@
 //! kilograms.
 
 use super::regions::Regions;
+use super::spacing::spacings;
 use super::tet_springs::{EDGES, edges, neighbours_of_missing};
 use crate::embedding::{EmbeddedPoint, with_riding};
 use numerics::adjacency::Adjacency;
@@ -147,8 +148,8 @@ pub struct SoftBody {
     pub(super) riding: Vec<EmbeddedPoint>,
     /// Longest side of the bounding box at rest, metres.
     pub(super) size: f64,
-    /// Mean rest length of the springs, metres.
-    pub(super) spacing: f64,
+    /// For each particle the mean rest length of the springs of its piece, metres.
+    pub(super) spacing: Vec<f64>,
 }
 
 #[derive(Clone, Debug)]
@@ -397,7 +398,6 @@ impl SoftBody {
         let length = |ends: &[u32; 2]| (points[ends[0] as usize] - points[ends[1] as usize]).norm();
         let lengths: Vec<f64> =
             ends[..mesh_spring_count].iter().map(length).chain(joints.iter().map(|spring| spring.length)).collect();
-        let spacing = mean(&lengths);
         let given: Vec<MeshTet> = mesh
             .tets
             .iter()
@@ -411,6 +411,7 @@ impl SoftBody {
             })
             .collect();
         let ends: Vec<[u32; 2]> = ends.iter().map(|ends| ends.map(|end| order.index_of[end as usize])).collect();
+        let spacing = spacings(&order, &ends, &lengths);
         let rest: Vec<DVec3> = order.caller_of.iter().map(|caller| points[*caller as usize]).collect();
         let (kept, tets) = with_volume(mesh, &points, &order);
         let volumes: Vec<f64> = kept.iter().map(|tet| given[*tet as usize].volume).collect();

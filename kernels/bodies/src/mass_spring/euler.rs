@@ -4,6 +4,7 @@
 //! they agree (see [`super::friction`]). The result satisfies Coulomb's law for its own normal forces.
 
 use super::contact::{Contact, ContactConstraint, ContactQuery};
+use super::spacing;
 use super::springs::distance;
 use super::stage::{Solved, Stage};
 use super::step::{Interval, StepEnd, Stepper, deepest, sum};
@@ -26,8 +27,10 @@ impl Stepper<'_> {
         let known = found
             .iter()
             .filter_map(|contact| ContactConstraint::new(body, contact, self.seconds, &self.solver.particle_stiffness));
-        let displacement = body.spacing * h / self.seconds;
-        let known = known.map(|c| c.depenetrating(&start.x, h, displacement).with_load(&start.x, &start.loads, h));
+        let known = known.map(|c| {
+            let displacement = spacing::least(body, &c) * h / self.seconds;
+            c.depenetrating(&start.x, h, displacement).with_load(&start.x, &start.loads, h)
+        });
         let mut known: Vec<ContactConstraint> = known.collect();
         // Contacts of the same points share the last loads.
         let asked = self.loads(&known, |contact| contact.load);
@@ -117,7 +120,9 @@ impl Stepper<'_> {
         for contact in contacts.iter().filter(|contact| contact.is_of_one_point()) {
             let before = contact.clearance(x, h);
             let missing = before.min(0.0) - contact.clearance(&out, 0.0);
-            if (missing > 0.0 || before < 0.0) && missing.abs() < MOST_NUDGE * self.context.body.spacing {
+            if (missing > 0.0 || before < 0.0)
+                && missing.abs() < MOST_NUDGE * spacing::least(self.context.body, contact)
+            {
                 contact.shift(missing, held, &mut out);
             }
         }

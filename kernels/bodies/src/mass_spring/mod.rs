@@ -35,6 +35,7 @@ mod predictor;
 mod regions;
 mod search;
 mod sides;
+mod spacing;
 mod springs;
 mod stage;
 mod state;

@@ -2,6 +2,7 @@
 //! started.
 
 use super::assemble::velocities;
+use super::body::SoftBody;
 use super::contact::ContactConstraint;
 use super::friction::LoadBalance;
 use super::springs;
@@ -67,8 +68,8 @@ impl StageSolver {
         };
         let mut solved = Solved::default();
         let (mut base, mut slow, mut stuck, mut reloads) = (ObjectiveParts::default(), false, false, 0);
-        // How far particles may have moved since tetrahedra were last watched.
-        let (mut moved, mut reloaded) = (f64::INFINITY, false);
+        // How far particles of each piece may have moved since tetrahedra were last watched.
+        let (mut moved, mut reloaded) = (vec![f64::INFINITY; context.body.order.pieces.len()], false);
         loop {
             let stage = &Stage { contacts: &*contacts, ..*stage };
             if std::mem::take(&mut reloaded) {
@@ -95,9 +96,14 @@ impl StageSolver {
             let wanted = (now > solved.enough && !slow) || deep || reload || !balance.is_in_balance();
             let is_cancelled = solved.newton > 0 && (context.cancelled)();
             if !wanted || stuck || is_cancelled || solved.newton >= most {
-                if moved > 0.0 && self.watch_thin(context, x) && !is_cancelled && solved.newton < most {
+                if moved.iter().any(|moved| *moved > 0.0)
+                    && self.watch_thin(context, x)
+                    && !is_cancelled
+                    && solved.newton < most
+                {
                     base.others = self.other_objective(stage, x);
-                    (slow, stuck, moved, self.measured) = (false, false, 0.0, true);
+                    (slow, stuck, self.measured) = (false, false, true);
+                    moved.fill(0.0);
                     continue;
                 }
                 let gave_up = wanted && !stuck && most > MOST;
@@ -128,9 +134,8 @@ impl StageSolver {
                 self.forget_pressures();
             }
             base = lower;
-            moved += share * self.longest_move();
-            if moved > THINNING * context.body.spacing {
-                moved = 0.0;
+            if self.add_moves(context.body, share, &mut moved) {
+                moved.fill(0.0);
                 if self.watch_thin(context, x) {
                     base.others = self.other_objective(stage, x);
                 }
@@ -141,6 +146,18 @@ impl StageSolver {
             solved.set_residual(self.square(stage));
         }
         solved
+    }
+
+    /// Adds to how far each piece has `moved` a `share` of the direction, by its largest component; returns whether
+    /// tetrahedra may have become thin by that.
+    fn add_moves(&self, body: &SoftBody, share: f64, moved: &mut [f64]) -> bool {
+        let mut any = false;
+        for (piece, moved) in body.order.pieces.iter().zip(moved) {
+            let particles = body.particles(piece);
+            *moved += share * self.dx[particles.clone()].iter().map(|d| d.amax()).fold(0.0, f64::max);
+            any |= *moved > THINNING * body.spacing[particles.start];
+        }
+        any
     }
 
     /// Corrects the angular momentum of free groups, unless that raises the objective above `base`, as closing
