@@ -9,6 +9,17 @@ use crate::velocity::{FaceFields, Site};
 /// Distance of a solid's surface from the middle of a cell that it cuts, at most, in cells.
 const FARTHEST: f32 = 1.0;
 
+/// How what presses on a solid changes from the middle of a cell to the solid's surface.
+#[derive(Clone, Copy)]
+pub(super) enum Slopes<'a> {
+    /// As the pressure does from cell to cell.
+    OfPressure,
+    /// As pressure and viscous stress together do: by the momentum that the liquid between lost to them. `lost`: by each
+    /// low face that moves, ÷ volume, m/s, 0 at others. In thick liquid the pressure alone changes by more than its weight
+    /// from cell to cell, which viscous stress balances.
+    OfStress { lost: &'a FaceFields<f64> },
+}
+
 /// The impulse of a pressure `q` on a solid, ÷ density · cell³: the pressure on its surface · its area, cell by cell.
 /// `open`: the open share of each low face of `rows`.
 pub(super) fn pressed(
@@ -17,6 +28,7 @@ pub(super) fn pressed(
     open: &FaceFields<f32>,
     solver: &PressureSolver,
     q: &[f64],
+    slopes: Slopes<'_>,
 ) -> [f64; 3] {
     // Walls and nozzles close faces, too.
     let share = |axis: usize, cell: Cell, at: usize| {
@@ -36,7 +48,10 @@ pub(super) fn pressed(
             let middle = Site::Centre.of(cell);
             let away = solid.distance(middle).clamp(-FARTHEST, FARTHEST);
             let normal = solid.normal(middle).unwrap_or_default();
-            let slopes = slopes(solver, &open, q, run, n);
+            let slopes = match slopes {
+                Slopes::OfPressure => of_pressure(solver, &open, q, run, n),
+                Slopes::OfStress { lost } => of_stress(&open, lost, run, n),
+            };
             let mut pressure = q[at];
             (0..3).for_each(|axis| pressure -= slopes[axis] * f64::from(away * normal[axis]));
             (0..3).for_each(|axis| sum[axis] += pressure * area[axis]);
@@ -50,7 +65,7 @@ fn on_solver(solver: &PressureSolver, rows: &CellRows, field: &[f32]) -> Vec<f32
 }
 
 /// How a pressure changes along each axis, per cell: the mean of the differences to liquid neighbours; 0 without one.
-fn slopes(solver: &PressureSolver, open: &FaceFields<f32>, q: &[f64], run: &Run, n: usize) -> [f64; 3] {
+fn of_pressure(solver: &PressureSolver, open: &FaceFields<f32>, q: &[f64], run: &Run, n: usize) -> [f64; 3] {
     let (at, below, above) = run.neighbours(n);
     [0, 1, 2].map(|axis| {
         let above = above[axis];
@@ -62,6 +77,16 @@ fn slopes(solver: &PressureSolver, open: &FaceFields<f32>, q: &[f64], run: &Run,
         if is_joined(above, above) {
             (sum, count) = (sum + q[above] - q[at], count + 1.0);
         }
+        if count > 0.0 { sum / count } else { 0.0 }
+    })
+}
+
+/// The momentum lost to pressure and viscosity along each axis: the mean of a cell's faces that move.
+fn of_stress(open: &FaceFields<f32>, lost: &FaceFields<f64>, run: &Run, n: usize) -> [f64; 3] {
+    let (at, _, above) = run.neighbours(n);
+    [0, 1, 2].map(|axis| {
+        let faces = [at, above[axis]].into_iter().filter(|face| open[axis][*face] > 0.0);
+        let (sum, count) = faces.fold((0.0, 0.0), |(sum, count), face| (sum + lost[axis][face], count + 1.0));
         if count > 0.0 { sum / count } else { 0.0 }
     })
 }

@@ -9,7 +9,7 @@ use crate::rows::CellRows;
 use crate::stencil::Stencil;
 use crate::step::domain::{Domain, Obstacle};
 use crate::step::exchange::Imposed;
-use crate::step::force::pressed;
+use crate::step::force::{Slopes, pressed};
 use crate::step::motion::{Guess, LiquidCells, Motion};
 use crate::step::pour::{Pour, pour};
 use crate::step::{LiquidReport, LiquidSettings, ViscousSolve};
@@ -126,7 +126,7 @@ impl Projection<'_> {
         let stop = Stop { flow: self.flow_tolerance(scale), iterations: self.settings.max_iterations };
         let solved = solver.solve(&mut inflow, &mut q, stop);
         subtract_gradient(&solver, cells, density.as_ref(), &q, faces);
-        let force = self.solid.map(|solid| pressed(solid, &cells.rows, &cells.open, &solver, &q));
+        let force = self.solid.map(|solid| pressed(solid, &cells.rows, &cells.open, &solver, &q, Slopes::OfPressure));
         *guess = Guess { rows: solver.rows().clone(), q };
         let is_done = solved.flow <= stop.flow;
         LiquidReport {

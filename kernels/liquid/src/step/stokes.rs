@@ -1,10 +1,11 @@
 //! The end of a substep of a viscous liquid: pressure and viscosity act at once, or one after the other.
 
+use crate::pressure::face_densities;
 use crate::rows::CellRows;
 use crate::step::LiquidReport;
 use crate::step::domain::{Obstacle, Wall, share_outside};
 use crate::step::exchange::Imposed;
-use crate::step::force::pressed;
+use crate::step::force::{Slopes, pressed};
 use crate::step::motion::Guess;
 use crate::step::pour::{Pour, pour};
 use crate::step::project::{Projection, covered, net};
@@ -19,6 +20,8 @@ struct ViscousEquations {
     rows: CellRows,
     open: FaceFields<f32>,
     solid_velocity: Option<FaceFields<f32>>,
+    level_set: Vec<f32>,
+    density: Vec<f32>,
     solver: StokesSolver,
 }
 
@@ -48,7 +51,7 @@ impl Projection<'_> {
             slip: &|axis, cell| domain.slip(axis, cell, self.settings.slip),
             periods: domain.periods(),
         });
-        ViscousEquations { rows, open, solid_velocity, solver }
+        ViscousEquations { rows, open, solid_velocity, level_set, density, solver }
     }
 
     /// Thick liquid creeps far more slowly than gravity would have it.
@@ -79,7 +82,8 @@ impl Projection<'_> {
         let solved = solver.solve(&before, &mut u, &mut q, &inflow, stop);
         let force = self.solid.map(|solid| {
             let mut force = self.viscous_impulse(&equations, &u, solid);
-            let of_pressure = pressed(solid, rows, open, solver.pressure(), &q);
+            let lost = equations.lost(&before, &u);
+            let of_pressure = pressed(solid, rows, open, solver.pressure(), &q, Slopes::OfStress { lost: &lost });
             force.iter_mut().zip(of_pressure).for_each(|(force, of_pressure)| *force += of_pressure);
             force
         });
@@ -141,7 +145,7 @@ impl Projection<'_> {
 
     /// A velocity on the cells of the solver; `with_solids`: that of solids at the faces that they close.
     fn on_solver(&self, equations: &ViscousEquations, faces: &FaceFields<f32>, with_solids: bool) -> FaceFields<f64> {
-        let ViscousEquations { rows, open, solid_velocity, solver } = equations;
+        let ViscousEquations { rows, open, solid_velocity, solver, .. } = equations;
         std::array::from_fn(|axis| {
             let mut own = rows.resampled(&self.cells.rows, &faces[axis], 0.0);
             if let Some(solid) = solid_velocity.as_ref().filter(|_| with_solids) {
@@ -173,9 +177,24 @@ impl Projection<'_> {
 }
 
 impl ViscousEquations {
+    /// The momentum that the liquid at each free face loses to pressure and viscosity, ÷ reference density · volume, m/s;
+    /// 0 at others. On the solver's cells.
+    fn lost(&self, before: &FaceFields<f64>, u: &FaceFields<f64>) -> FaceFields<f64> {
+        let Self { rows, density, solver, .. } = self;
+        let density = face_densities(rows, &self.level_set, density);
+        std::array::from_fn(|axis| {
+            let density = solver.rows().resampled(rows, &density[axis], 1.0);
+            let lost = |at: usize| match solver.is_free(axis, at) {
+                true => f64::from(density[at]) * (before[axis][at] - u[axis][at]),
+                false => 0.0,
+            };
+            (0..density.len()).map(lost).collect()
+        })
+    }
+
     /// The net inflow of each liquid cell that solids drive, m/s.
     fn driven(&self) -> Vec<f64> {
-        let Self { rows, open, solid_velocity, solver } = self;
+        let Self { rows, open, solid_velocity, solver, .. } = self;
         let Some(solid) = solid_velocity else { return vec![0.0; solver.rows().len()] };
         let through = std::array::from_fn(|axis| {
             let covered: Vec<f64> = covered(axis, open, solid).collect();

@@ -10,8 +10,8 @@
 //! complement one cycle of the pressure equation plus the resistance of viscosity (Cahouet and Chabard 1988). Rigid motions of
 //! every component that is free to move are solved for exactly in each iteration; without that, nearly rigid liquid
 //! takes five times the iterations and loses its spin.
-//! Where a liquid's momentum outweighs its viscosity in every cell, smoothing alone does for both, and neither coarser grids nor
-//! rigid motions are set up.
+//! Where a liquid's momentum outweighs its viscosity in every cell, smoothing alone does for both: there are no coarser grids,
+//! and rigid motions only keep their momentum.
 
 mod alone;
 mod coarsen;
@@ -22,6 +22,7 @@ mod rigid;
 mod setup;
 #[cfg(test)]
 mod tests;
+mod unresisted;
 
 use crate::fields::{add_scaled, in_parts, largest, weighted_dot};
 use crate::pressure::{PressureGrid, PressureSolver, PressureWorkspace, face_densities};
@@ -86,6 +87,8 @@ pub struct StokesSolver {
     pressure: PressureSolver,
     viscous: Multigrid,
     rigid: RigidMotions,
+    /// Whether smoothing alone reaches every error: see [`LIGHT`].
+    is_light: bool,
     flow: Flow,
     /// See [`resistance`].
     resistance: Vec<f64>,
@@ -103,8 +106,11 @@ struct Unknowns {
 const LIGHT: f32 = 0.125;
 
 /// Directions kept for orthogonality, at most; the oldest is dropped first. Ten are not enough where the viscosity jumps
-/// by 1e8.
-const KEPT: usize = 40;
+/// by 1e8, nor forty where stiff liquid of few cells touches soft.
+const KEPT: usize = 96;
+
+/// Iterations after which the best velocity is kept, in case that the stop is not reached.
+const SLOW: u32 = 40;
 
 /// Bytes that the kept directions take, at most, unless they are fewer than [`LEAST_KEPT`].
 const KEPT_BYTES: usize = 3 << 29;
@@ -126,9 +132,10 @@ impl StokesSolver {
         let pressure = PressureSolver::new(&pressure_grid);
         let (level, flow) = setup::set_up(grid, &pressure);
         let is_light = largest_viscosity(grid) <= LIGHT;
-        let rigid = if is_light { RigidMotions::default() } else { RigidMotions::find(&level) };
+        let find = if is_light { RigidMotions::find_unresisted } else { RigidMotions::find };
+        let rigid = find(&level, &flow.open);
         let resistance = resistance(&level, &flow, &pressure);
-        Self { pressure, viscous: Multigrid::new(level, is_light), rigid, flow, resistance }
+        Self { pressure, viscous: Multigrid::new(level, is_light), rigid, is_light, flow, resistance }
     }
 
     /// The cells that fields of this solver are stored for.
@@ -176,12 +183,19 @@ impl StokesSolver {
         solved.unbalanced = self.pressure.balance(&mut residual.q);
         let kept = (KEPT_BYTES / (8 * size_of::<f64>() * len.max(1))).clamp(LEAST_KEPT, KEPT);
         let mut directions: Vec<(Unknowns, Unknowns, f64)> = Vec::new();
+        let mut best: Option<(f64, StokesSolved, FaceFields<f64>, Vec<f64>)> = None;
         loop {
             solved.flow = largest(&residual.q);
             let mut z = if directions.len() == kept { directions.remove(0).0 } else { zero() };
             self.precondition(&residual, &mut work, &mut z);
             solved.velocity = z.u.iter().map(|u| largest(u)).fold(0.0, f64::max);
             let is_done = solved.flow <= stop.flow && solved.velocity <= stop.velocity;
+            if solved.iterations >= SLOW && !is_done {
+                let error = (solved.flow / stop.flow).max(solved.velocity / stop.velocity);
+                if best.as_ref().is_none_or(|(least, ..)| error < *least) {
+                    best = Some((error, solved, u.clone(), q.to_vec()));
+                }
+            }
             if is_done || solved.iterations >= stop.iterations || !solved.velocity.is_finite() {
                 break;
             }
@@ -206,6 +220,14 @@ impl StokesSolver {
             directions.push((z, product, norm));
             solved.iterations += 1;
         }
+        // Where stiff liquid touches soft, a residual that becomes less may hide an error of velocity that grows.
+        let is_done = solved.flow <= stop.flow && solved.velocity <= stop.velocity;
+        if let Some((_, best, best_u, best_q)) = best.filter(|_| !is_done) {
+            solved = StokesSolved { iterations: solved.iterations, ..best };
+            *u = best_u;
+            q.copy_from_slice(&best_q);
+        }
+        self.rigid.keep_momentum(level, before, u);
         level.images.fill_each(u);
         level.images.fill(q);
         solved
@@ -267,14 +289,18 @@ impl StokesSolver {
         for (bending, force) in work.bending.iter_mut().zip(&work.force) {
             in_parts(bending, |first, part| part.copy_from_slice(&force[first..][..part.len()]));
         }
-        self.rigid.remove(level, &mut work.bending);
+        if !self.is_light {
+            self.rigid.remove(level, &mut work.bending);
+        }
         let force = work.bending.iter().map(|force| largest(force)).fold(0.0, f64::max);
         if force > 0.0 {
             self.viscous.solve(&mut work.viscous, &work.bending, force, z);
         } else {
             z.iter_mut().for_each(|u| u.fill(0.0));
         }
-        self.rigid.complete(level, &work.force, z);
+        if !self.is_light {
+            self.rigid.complete(level, &work.force, z);
+        }
     }
 
     /// `out` = the matrix times `z`, whose velocity is 0 at solid faces.

@@ -12,20 +12,21 @@ use crate::rows::{Cell, Finder};
 use crate::sets::Sets;
 
 use super::level::{FaceKind, Level, Stresses};
+use super::unresisted::{obstruction, unresisted};
 use crate::velocity::FaceFields;
 
 /// Free faces of a component next to each other along x.
 #[derive(Clone, Copy, Debug)]
-struct Piece {
-    axis: usize,
-    at: usize,
-    len: usize,
-    cell: Cell,
+pub(super) struct Piece {
+    pub axis: usize,
+    pub at: usize,
+    pub len: usize,
+    pub cell: Cell,
 }
 
 impl Piece {
     /// The six motions at a face: three translations, then three turns about the centre.
-    fn motions(&self, n: usize, about: Centre) -> [f64; 6] {
+    pub(super) fn motions(&self, n: usize, about: Centre) -> [f64; 6] {
         let Centre { centre, size, turns } = about;
         if !turns {
             return std::array::from_fn(|motion| if motion == self.axis { 1.0 } else { 0.0 });
@@ -45,7 +46,7 @@ impl Piece {
 
 /// What turns are about.
 #[derive(Clone, Copy, Debug)]
-struct Centre {
+pub(super) struct Centre {
     centre: [f64; 3],
     size: f64,
     /// Whether the component can turn: one that meets its own image cannot.
@@ -54,13 +55,17 @@ struct Centre {
 
 /// A component that no solid holds firmly.
 #[derive(Clone, Debug)]
-struct Component {
-    pieces: Vec<Piece>,
-    about: Centre,
+pub(super) struct Component {
+    pub pieces: Vec<Piece>,
+    pub about: Centre,
     /// Of the matrix, on the six motions.
     inverse: Matrix6<f64>,
     /// What the matrix has besides their mass: faces beside solids that resist.
     resistance: Vec<(usize, usize, [f64; 6])>,
+    /// That of mass alone.
+    mass: Matrix6<f64>,
+    /// From momentum to the motions that carry it, among those that nothing resists; none where there are no such.
+    unresisted: Option<Matrix6<f64>>,
 }
 
 /// All components whose rigid motions a multigrid cycle would leave.
@@ -86,25 +91,69 @@ const PIECES: usize = 32;
 const ROUNDING: f64 = 1e-12;
 
 impl RigidMotions {
-    pub(super) fn find(level: &Level) -> Self {
+    /// `open`: the open share of each low face.
+    pub(super) fn find(level: &Level, open: &FaceFields<f32>) -> Self {
         let whole = components(level, 0.0);
         let sizes: Vec<usize> = whole.iter().map(|part| faces(&part.pieces)).collect();
         let largest = level.normal.iter().copied().fold(0.0, f32::max);
         let least = level.normal.iter().copied().filter(|viscosity| *viscosity > 0.0).fold(largest, f32::min);
-        let mut stresses = Stresses::zero(level.rows().len());
-        let mut stiff: Vec<(Part, f32)> = Vec::new();
+        let mut stiff: Vec<Part> = Vec::new();
         let mut threshold = largest / STIFFER;
         while threshold > least && threshold > 1.0 {
             let parts = components(level, threshold).into_iter().filter(|part| !sizes.contains(&faces(&part.pieces)));
-            let known: Vec<usize> = stiff.iter().map(|(part, _)| faces(&part.pieces)).collect();
-            stiff.extend(parts.filter(|part| !known.contains(&faces(&part.pieces))).map(|part| (part, threshold)));
+            let known: Vec<usize> = stiff.iter().map(|part| faces(&part.pieces)).collect();
+            stiff.extend(parts.filter(|part| !known.contains(&faces(&part.pieces))));
             threshold /= STIFFER;
         }
-        stiff.sort_by_key(|(part, _)| std::cmp::Reverse(faces(&part.pieces)));
+        stiff.sort_by_key(|part| std::cmp::Reverse(faces(&part.pieces)));
         stiff.truncate(MOST_STIFF);
-        let stiff = stiff.into_iter().map(|(part, threshold)| (part, Some(threshold)));
-        let all = whole.into_iter().map(|part| (part, None)).chain(stiff);
-        Self(all.filter_map(|(part, stiff)| Component::new(level, part, stiff, &mut stresses)).collect())
+        let mut stresses = Stresses::zero(level.rows().len());
+        let whole: Vec<Component> = whole.into_iter().map(|part| Component::of(level, part)).collect();
+        let obstructions = obstruction(level, open, &whole);
+        let whole = whole.into_iter().zip(&obstructions);
+        let mut found: Vec<Component> = whole
+            .filter_map(|(component, obstruction)| component.set_up(level, Some(obstruction), &mut stresses))
+            .collect();
+        let stiff = stiff.into_iter().map(|part| Component::of(level, part));
+        found.extend(stiff.filter_map(|component| component.set_up(level, None, &mut stresses)));
+        Self(found)
+    }
+
+    /// Those alone of components that something does not resist at all, for [`Self::keep_momentum`].
+    pub(super) fn find_unresisted(level: &Level, open: &FaceFields<f32>) -> Self {
+        let whole: Vec<Component> = components(level, 0.0).into_iter().map(|part| Component::of(level, part)).collect();
+        let obstructions = obstruction(level, open, &whole);
+        let passing = whole
+            .into_iter()
+            .zip(&obstructions)
+            .filter(|(component, obstruction)| unresisted(&component.mass, &Matrix6::zeros(), obstruction).is_some());
+        let mut stresses = Stresses::zero(level.rows().len());
+        let set_up =
+            passing.filter_map(|(component, obstruction)| component.set_up(level, Some(obstruction), &mut stresses));
+        Self(set_up.filter(|component| component.unresisted.is_some()).collect())
+    }
+
+    /// Gives `u` the momentum that `before` has in every rigid motion that neither solids nor viscosity resist, of
+    /// components that touch a solid. Pressure has no part in it: its work on such a motion is that at the surface, which is 0. Its differences,
+    /// weighed by the liquid beside each face so that weight at rest is balanced exactly, do not add up to that where
+    /// the surface lies between faces. As these motions have neither stress nor divergence, what is added is what
+    /// a pressure whose differences do add up would give.
+    pub(super) fn keep_momentum(&self, level: &Level, before: &FaceFields<f64>, u: &mut FaceFields<f64>) {
+        for component in &self.0 {
+            let Some(unresisted) = &component.unresisted else { continue };
+            let of_piece = |piece: &Piece| {
+                let mut sum = Vector6::zeros();
+                for n in 0..piece.len {
+                    let (axis, at) = (piece.axis, piece.at + n);
+                    let lost = f64::from(level.mass[axis][at]) * (before[axis][at] - u[axis][at]);
+                    sum += Vector6::from(piece.motions(n, component.about)) * lost;
+                }
+                sum
+            };
+            let sums = parallel::tabulate(component.pieces.len(), PIECES, |n| of_piece(&component.pieces[n]));
+            let lost: Vector6<f64> = sums.iter().sum();
+            component.for_each_motion(&(unresisted * lost), u, |_, _, u, motion| *u += motion);
+        }
     }
 
     /// Takes from `b` what moves components as rigid bodies: a multigrid cycle would answer it by a motion that is nearly
@@ -131,9 +180,8 @@ impl RigidMotions {
 }
 
 impl Component {
-    /// `stiff`: the least viscosity of a part that is stiffer than its component. `None` where a multigrid cycle is good
-    /// enough, because solids hold the component.
-    fn new(level: &Level, part: Part, stiff: Option<f32>, stresses: &mut Stresses<f64>) -> Option<Self> {
+    /// Its mass; [`Self::set_up`] does the rest.
+    fn of(level: &Level, part: Part) -> Self {
         let Part { pieces, turns } = part;
         let (mut total, mut first) = (0.0, [0.0; 3]);
         let (mut low, mut high) = ([i32::MAX; 3], [i32::MIN; 3]);
@@ -153,23 +201,34 @@ impl Component {
         let centre = first.map(|sum| sum / total);
         let size = f64::from((0..3).map(|axis| high[axis] - low[axis]).max().unwrap_or(1));
         let about = Centre { centre, size, turns };
-        let mut component = Self { pieces, about, inverse: Matrix6::zeros(), resistance: Vec::new() };
         let mut mass = Matrix6::zeros();
-        for piece in &component.pieces {
+        for piece in &pieces {
             for n in 0..piece.len {
                 let motions = Vector6::from(piece.motions(n, about));
                 mass += motions * motions.transpose() * f64::from(level.mass[piece.axis][piece.at + n]);
             }
         }
-        let resistance = component.resist(level, stiff.is_some(), stresses);
+        Self { pieces, about, mass, inverse: Matrix6::zeros(), resistance: Vec::new(), unresisted: None }
+    }
+
+    /// `obstruction`: by solids; none of a part that is stiffer than its component. `None` where a multigrid cycle is good
+    /// enough, because solids hold the component.
+    fn set_up(
+        mut self,
+        level: &Level,
+        obstruction: Option<&Matrix6<f64>>,
+        stresses: &mut Stresses<f64>,
+    ) -> Option<Self> {
+        let (mass, resistance) = (self.mass, self.resist(level, obstruction.is_none(), stresses));
         // A single face, or a thread of them, has fewer than six motions.
         let scale = (mass + resistance).trace() * 1e-12;
         let firm = resistance - mass * FIRM;
-        if stiff.is_none() && (firm + Matrix6::identity() * scale).cholesky().is_some() {
+        if obstruction.is_some() && (firm + Matrix6::identity() * scale).cholesky().is_some() {
             return None;
         }
-        component.inverse = (mass + resistance + Matrix6::identity() * scale).try_inverse()?;
-        Some(component)
+        self.inverse = (mass + resistance + Matrix6::identity() * scale).try_inverse()?;
+        self.unresisted = obstruction.and_then(|obstruction| unresisted(&mass, &resistance, obstruction));
+        Some(self)
     }
 
     /// Fills `resistance`; returns that of the six motions against each other.

@@ -351,3 +351,27 @@ fn coarse_grids_are_as_symmetric_as_the_fine_one() {
         }
     }
 }
+
+/// A column whose sides lie between faces, on a floor without friction, is squeezed by its weight and goes nowhere: what
+/// moves it along the floor, or turns it about the vertical, is rounding of its weight.
+#[test]
+fn a_column_on_a_floor_without_friction_is_moved_nowhere() {
+    for viscosity in [10.0, 1e4, 1e8] {
+        let sides = |x: f32, low: f32, high: f32| (low - x).max(x - high);
+        let column = |[x, y, z]: [f32; 3]| sides(x, 3.37, 8.61).max(sides(z, 3.52, 8.48)).max(y - 14.45);
+        let solver = Case { slip: 1.0, ..Case::new([12, 20, 12], viscosity, column) }.solver();
+        let before = velocity(&solver, |_| [0.0, -1.0, 0.0]);
+        let mut u = before.clone();
+        solve(&solver, &mut u, 1e-6);
+        let level = solver.viscous.finest();
+        let (mut weight, mut moved) = (0.0, [0.0; 3]);
+        for (at, [x, _, z]) in level.rows().iter().enumerate() {
+            let gained = [0, 1, 2].map(|axis| f64::from(level.mass[axis][at]) * (u[axis][at] - before[axis][at]));
+            weight += f64::from(level.mass[1][at]);
+            moved[0] += gained[0];
+            moved[1] += gained[2];
+            moved[2] += gained[0] * (f64::from(z) + 0.5) - gained[2] * (f64::from(x) + 0.5);
+        }
+        assert!(moved.iter().all(|moved| moved.abs() < 1e-6 * weight), "{viscosity:e}: {moved:?} {weight}");
+    }
+}

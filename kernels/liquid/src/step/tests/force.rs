@@ -90,3 +90,26 @@ fn a_plate_over_liquid_without_end_is_held_back_on_all_of_its_area() {
         assert!((force / expected - 1.0).abs() < 1e-3, "{axis} {count}: {force} {expected}");
     }
 }
+
+/// Whatever viscosity holds it together: what stands still is carried by its whole weight.
+#[test]
+fn a_plate_carries_the_weight_of_the_thick_block_on_it() {
+    let mut domain = Domain::closed([0; 3], [20; 3]);
+    domain.walls = [[Wall::Open; 2]; 3];
+    for (floor, slip) in [(4.0_f32, 0.0), (4.4, 0.0), (4.4, 1.0), (3.7, 0.0)] {
+        for viscosity in [1e4, 1e7] {
+            let solid = move |_: f64, p: Vec3| p[1] - floor;
+            let settings = LiquidSettings { tolerance: 1e-6, slip, ..LiquidSettings::new(domain, 0.05) };
+            let high = floor + 8.0;
+            let mut liquid = Liquid::new(settings, Still::new(domain, block([6.0, -99.0, 6.0], [14.0, high, 14.0])));
+            let viscosity = |_| viscosity;
+            let around = Surroundings { viscosity: &viscosity, solid: Some(Solid::still(&solid)), ..FALLING };
+            let reports = [0; 4].map(|_| liquid.step_frame(&around, FRAME));
+            let [x, y, z] = reports[3].solid_force;
+            let expected = -weight(512.0);
+            let name = format!("floor {floor}, slip {slip}, {:e} Pa·s", viscosity(0.0));
+            assert!((y / expected - 1.0).abs() < 0.02, "{name}: {y} {expected}");
+            assert!(x.abs() < 1e-3 * y.abs() && z.abs() < 1e-3 * y.abs(), "{name}: {x} {z}");
+        }
+    }
+}

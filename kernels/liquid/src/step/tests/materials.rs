@@ -148,3 +148,23 @@ fn layers_share_the_shear_by_their_viscosities() {
         assert!(worst < 0.08, "{inner} {outer}: {worst}");
     }
 }
+
+/// A box of two halves that touch and differ up to 10¹² times in viscosity turns about its middle: every solve reaches its
+/// tolerance, and nothing becomes faster.
+#[test]
+fn halves_of_any_viscosities_turn_without_gaining_speed() {
+    let domain = Domain { walls: [[Wall::Open; 2]; 3], ..Domain::closed([-8; 3], [8; 3]) };
+    for (thin, thick) in [(1e3, 1e9), (0.1, 1e5), (1e-3, 1e9)] {
+        let body = block([-4.0, -4.0, -3.0], [4.0, 4.0, 3.0]);
+        let mut liquid = Liquid::new(LiquidSettings::new(domain, 0.05), PlainLevelSet::new(domain, body));
+        let rate = std::f32::consts::TAU * 0.05;
+        liquid.set_velocity(|[x, y, _]| [-rate * y, rate * x, 0.0], &WEIGHTLESS);
+        liquid.set_materials(|p| of(if p[1] > 0.0 { thick } else { thin }, 1000.0));
+        for frame in 0..7 {
+            let report = liquid.step_frame(&WEIGHTLESS, FRAME);
+            assert_eq!(report.solves_cut_short, 0, "{thin:e} {thick:e}, frame {frame}: {report:?}");
+            let fastest = largest(&liquid) / f64::from(4.0 * rate);
+            assert!(fastest < 1.25, "{thin:e} {thick:e}, frame {frame}: {fastest}");
+        }
+    }
+}
