@@ -67,7 +67,7 @@ impl CollisionScene<'_> {
     /// Adds the particles on the surface of a skin whose edges to its largest part all go through an obstacle: this part is
     /// on the right side.
     fn add_severed(&self, (skin_index, obstacle): (usize, usize), x: &[[f64; 3]], caught: &mut Vec<CaughtParticle>) {
-        // What is being pushed out goes through for now.
+        // What is being pushed out passes through meanwhile.
         if self.separating(skin_index, OverlapPartner::Obstacle(obstacle)).is_some() {
             return;
         }
