@@ -13,10 +13,7 @@ use crate::step::outflow::Outflow;
 use crate::step::sources::FlowAccount;
 use crate::step::substep::most_layers;
 use crate::step::{LiquidSettings, Moving, Surface, Surroundings, Wall};
-use crate::velocity::{ALL_FACES, FaceFields, FaceMask, MacVelocity, Sampler, Site, extrapolate_first, resampled};
-
-/// Layers past the liquid in which what is carried has values of its own: the faces of the next substep come from there.
-pub(super) const OWN_LAYERS: u32 = 3;
+use crate::velocity::{ALL_FACES, FaceFields, FaceMask, MacVelocity, Sampler, Site, Slopes, extrapolate, resampled};
 
 /// What gravity and pressure together added to the velocity in a substep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -165,7 +162,8 @@ impl Motion {
     /// The velocity, m/s, continued `layers` cells past the liquid, but no farther than a substep follows it.
     pub fn velocity_past_liquid(&self, domain: &Domain, layers: i32) -> MacVelocity {
         let rows = self.rows_past_liquid(domain, layers.min(most_layers()));
-        let [faces] = self.continued([self.velocity.faces()], &rows, (f32::INFINITY, OWN_LAYERS), domain, None);
+        let slopes = [Slopes::nearest(f32::INFINITY)];
+        let [faces] = self.continued([self.velocity.faces()], &rows, (slopes, u32::MAX), domain, None);
         MacVelocity::new(rows, faces)
     }
 
@@ -184,13 +182,13 @@ impl Motion {
         std::array::from_fn(|axis| faces[axis].iter().zip(&gained[axis]).map(|(u, gain)| u + ratio * gain).collect())
     }
 
-    /// Fields that are known where the velocity is, continued to all of `rows`; `steepest`, and how many layers past
-    /// the liquid are of each field's own: see [`extrapolate_first`].
+    /// Fields that are known where the velocity is, continued to all of `rows` by slopes for so many layers past the
+    /// liquid, see [`extrapolate`].
     pub(super) fn continued<const F: usize>(
         &self,
         fields: [&FaceFields<f32>; F],
         rows: &CellRows,
-        (steepest, own_layers): (f32, u32),
+        (slopes, layers): ([Slopes; F], u32),
         domain: &Domain,
         solid: Option<Obstacle<'_>>,
     ) -> [FaceFields<f32>; F] {
@@ -199,7 +197,7 @@ impl Motion {
         let mut fields = fields.map(|faces| resampled(rows, self.rows(), faces));
         images.fill(&mut known);
         fields.iter_mut().for_each(|faces| images.fill_each(faces));
-        extrapolate_first(rows, &mut known, fields.each_mut(), steepest, [own_layers, u32::MAX]);
+        extrapolate(rows, &mut known, fields.each_mut(), slopes, layers);
         fields.map(|mut faces| {
             images.fill_each(&mut faces);
             hold_walls(domain, rows, &mut faces);

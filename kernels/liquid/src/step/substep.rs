@@ -8,13 +8,13 @@ use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
 use crate::step::first::begin;
 use crate::step::flight::Flight;
-use crate::step::motion::{Gain, LiquidCells, Motion, OWN_LAYERS, largest_of};
+use crate::step::motion::{Gain, LiquidCells, Motion, largest_of};
 use crate::step::outflow::outflow;
 use crate::step::project::{Materials, Projection};
 use crate::step::sources::{LiquidSink, LiquidSource, Span};
 use crate::step::turned;
 use crate::step::{LiquidReport, LiquidSettings, Splitting};
-use crate::velocity::{Advection, Around, FaceFields, MacVelocity, Sampler, resampled};
+use crate::velocity::{Advection, Around, FaceFields, MacVelocity, Sampler, Slopes, resampled};
 
 /// What is around a liquid.
 #[derive(Clone, Copy)]
@@ -115,6 +115,14 @@ impl<'a> Moving<'a> {
 /// Differences of velocity between neighbouring faces that are continued, in cells a substep: a flow that changes faster
 /// would turn its cells over.
 pub(super) const STEEPEST: f32 = 0.25;
+
+/// The same of what is carried, ÷ the largest speed. What is continued becomes the liquid's where it comes to: with the nearest
+/// differences, which short substeps do not bound, thin sheets of splashes drove themselves to ten times their energy.
+const STEEPEST_CARRIED: f32 = 0.25;
+
+/// Layers past the liquid, besides the cells that it moves in a substep, in which velocity goes on as it changes: the faces of
+/// the next substep come from there. Farther out there may be films too thin for a cell, which would fly off.
+const SLOPING_LAYERS: u32 = 2;
 
 /// Cells that liquid is followed over in a substep, at most, so that a substep takes a bounded time: what moves farther ends
 /// anywhere.
@@ -248,24 +256,27 @@ fn continued(
         Some(gain) => Some(turned::carried(motion, gain, periods, seconds, [step, steepest])),
         None => in_flight.is_some().then(|| own.clone()),
     };
+    let nearest = Slopes::nearest(steepest);
+    let of_carried = Slopes { steepest: steepest.min(STEEPEST_CARRIED * way / step), smooth: true };
+    let layers = SLOPING_LAYERS + reach.ceil() as u32;
     let mut continued = Continued { velocity: MacVelocity::default(), carried: None, before: None, way, reach };
     let mean = in_flight.as_ref().unwrap_or(own);
     let velocity = match carried {
         Some(carried) if motion.flies_shown => {
-            // As far as the liquid comes.
-            let limits = (steepest, OWN_LAYERS.max(reach as u32 + 2));
-            let [velocity, carried, before] = motion.continued([mean, &carried, own], &rows, limits, domain, solid);
+            let slopes = [nearest, of_carried, nearest];
+            let fields = [mean, &carried, own];
+            let [velocity, carried, before] = motion.continued(fields, &rows, (slopes, layers), domain, solid);
             (continued.carried, continued.before) = (Some(carried), Some(before));
             velocity
         }
         Some(carried) => {
-            let limits = (steepest, OWN_LAYERS);
-            let [velocity, carried] = motion.continued([mean, &carried], &rows, limits, domain, solid);
+            let slopes = [nearest, of_carried];
+            let [velocity, carried] = motion.continued([mean, &carried], &rows, (slopes, layers), domain, solid);
             continued.carried = Some(carried);
             velocity
         }
         None => {
-            let [velocity] = motion.continued([mean], &rows, (steepest, OWN_LAYERS), domain, solid);
+            let [velocity] = motion.continued([mean], &rows, ([nearest], layers), domain, solid);
             velocity
         }
     };

@@ -8,7 +8,7 @@
 
 use crate::rows::{CellRows, Periods};
 use crate::step::motion::{Gain, Motion};
-use crate::velocity::{Around, FaceFields, extrapolate, resampled};
+use crate::velocity::{Around, FaceFields, Slopes, extrapolate, resampled};
 
 /// Layers of faces past the liquid that differences at its faces reach.
 const REACHED: u32 = 2;
@@ -31,7 +31,7 @@ impl<const F: usize> Differences<F> {
         let mut fields = fields.map(|faces| resampled(&rows, motion.rows(), faces));
         images.fill(&mut known);
         fields.iter_mut().for_each(|faces| images.fill_each(faces));
-        extrapolate(&rows, &mut known, fields.each_mut(), steepest, REACHED);
+        extrapolate(&rows, &mut known, fields.each_mut(), [Slopes::nearest(steepest); F], REACHED);
         Self { rows, fields }
     }
 }

@@ -25,36 +25,74 @@ struct Line {
     len: u32,
     /// Whether the cells before the first and after the last are stored.
     joined: [bool; 2],
-    /// Where the first value of the rows at y − 2, y − 1, y + 1, y + 2 and z − 2, z − 1, z + 1, z + 2 is; of rows that are not
-    /// stored, a place past all cells, where nothing is known.
-    beside: [u32; 8],
+    /// Where the first value of each of the rows [`BESIDE`] is; of rows that are not stored, a place past all cells, where
+    /// nothing is known.
+    beside: [u32; 12],
     /// From there to the value beside the next cell: 1, or 0 where the row is not stored.
-    step: [u32; 8],
+    step: [u32; 12],
 }
 
-const BESIDE: [[i32; 2]; 8] = [[-2, 0], [-1, 0], [1, 0], [2, 0], [0, -2], [0, -1], [0, 1], [0, 2]];
-
-/// Pairs of a neighbour and the one behind it, as numbers of [`BESIDE`].
-const PAIRS: [[usize; 2]; 4] = [[1, 0], [2, 3], [5, 4], [6, 7]];
+/// Rows beside a line, as steps along y and z: on each of four sides the next, the one behind it and the third.
+#[rustfmt::skip]
+const BESIDE: [[i32; 2]; 12] = [
+    [-1, 0], [-2, 0], [-3, 0],
+    [1, 0], [2, 0], [3, 0],
+    [0, -1], [0, -2], [0, -3],
+    [0, 1], [0, 2], [0, 3],
+];
 
 impl Line {
     /// Where the rows next to it that are stored have its cells.
     fn rows_beside(&self) -> impl Iterator<Item = Range<usize>> {
-        let rows = PAIRS.into_iter().map(|[near, _]| near).filter(|near| self.step[*near] == 1);
+        let rows = (0..BESIDE.len()).step_by(3).filter(|near| self.step[*near] == 1);
         rows.map(|near| self.beside[near] as usize..(self.beside[near] + self.len) as usize)
     }
 
-    /// Each neighbour of a cell and the one behind it.
+    /// Each neighbour of a cell, the one behind it and the third.
     #[inline(always)]
-    fn pairs(&self, n: u32, nowhere: usize) -> [[usize; 2]; 6] {
+    fn sides(&self, n: u32, nowhere: usize) -> [[usize; 3]; 6] {
         // Cells of a line that follow each other are stored next to each other; beyond its ends one more is known of.
         let (at, below) = (self.at + n, n + u32::from(self.joined[0]));
         let above = self.len - 1 - n + u32::from(self.joined[1]);
         let down = |by: u32| if by <= below { (at - by) as usize } else { nowhere };
         let up = |by: u32| if by <= above { (at + by) as usize } else { nowhere };
-        let pair = |rows: [usize; 2]| rows.map(|row| (self.beside[row] + n * self.step[row]) as usize);
-        let [a, b, c, d] = PAIRS;
-        [[down(1), down(2)], [up(1), up(2)], pair(a), pair(b), pair(c), pair(d)]
+        let side = |first: usize| [0, 1, 2].map(|by| (self.beside[first + by] + n * self.step[first + by]) as usize);
+        [[1, 2, 3].map(down), [1, 2, 3].map(up), side(0), side(3), side(6), side(9)]
+    }
+}
+
+/// Which differences between faces one behind the other are continued.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slopes {
+    /// What they count as at most, which bounds what a rough field grows to.
+    pub steepest: f32,
+    /// Whether only those of smooth fields count: all of a difference that is the same as the next, nothing of one that is
+    /// twice the next, half of it, or the only one.
+    pub smooth: bool,
+}
+
+impl Slopes {
+    /// None: values go on as they are.
+    const FLAT: Self = Self::nearest(0.0);
+
+    /// The nearest difference, whatever the next is.
+    pub const fn nearest(steepest: f32) -> Self {
+        Self { steepest, smooth: false }
+    }
+
+    #[inline(always)]
+    fn of(self, nearest: f32, next: Option<f32>) -> f32 {
+        let slope = match next {
+            _ if !self.smooth => nearest,
+            Some(next) if nearest * next > 0.0 => {
+                let [less, more] = if nearest.abs() < next.abs() { [nearest, next] } else { [next, nearest] };
+                let rough = 3.0 * (more - less) / (more + less);
+                if rough < 1.0 { less * (1.0 - rough) } else { 0.0 }
+            }
+            _ => 0.0,
+        };
+        let slope = if slope > self.steepest { self.steepest } else { slope };
+        if slope < -self.steepest { -self.steepest } else { slope }
     }
 }
 
@@ -174,32 +212,17 @@ impl Front {
     }
 }
 
-/// Continues `fields` on `rows` from the faces `known` to all others that can be reached. Differences between faces one
-/// behind the other count as at most `steepest`, which bounds what a rough field grows to. At most `layers` are added.
-/// In parallel; the same bits on any number of threads.
+/// Continues `fields` on `rows` from the faces `known` to all others that can be reached: for so many `layers` each by its
+/// `slopes`, farther as it is. In parallel; the same bits on any number of threads.
 ///
 /// # Panics
 /// Where a field does not have one value a cell.
 pub fn extrapolate<const F: usize>(
     rows: &CellRows,
     known: &mut [FaceMask],
-    fields: [&mut FaceFields<f32>; F],
-    steepest: f32,
-    layers: u32,
-) {
-    extrapolate_first(rows, known, fields, steepest, [layers; 2]);
-}
-
-/// The same with each field continued by `own` layers; then up to `layers` the first alone, and the others are as it is.
-///
-/// # Panics
-/// Where a field does not have one value a cell.
-pub fn extrapolate_first<const F: usize>(
-    rows: &CellRows,
-    known: &mut [FaceMask],
     mut fields: [&mut FaceFields<f32>; F],
-    steepest: f32,
-    [own, layers]: [u32; 2],
+    slopes: [Slopes; F],
+    layers: u32,
 ) {
     let fits = |faces: &&mut FaceFields<f32>| faces.iter().all(|field| field.len() == rows.len());
     assert!(known.len() == rows.len() && fields.iter().all(fits), "one value a cell");
@@ -216,10 +239,10 @@ pub fn extrapolate_first<const F: usize>(
         parallel::for_each(chunks.iter().map(|chunk| rest.split_off(end(chunk))), change);
     };
     update(&mut masks, &mut packed, &|_, mut part| part.pack());
-    for layer in 0..layers {
-        let continued = if layer < own { F } else { 1 };
+    for layer in 0.. {
         let gains: Vec<Gains<F>> = {
-            let layer = Layer { lines: &lines, known: &masks, values: &packed, steepest, continued };
+            let slopes = if layer < layers { slopes } else { [Slopes::FLAT; F] };
+            let layer = Layer { lines: &lines, known: &masks, values: &packed, slopes };
             parallel::map(&chunks, |_, chunk| layer.gains(chunk, &front.is_near))
         };
         if gains.iter().all(|gains| gains.lines.is_empty()) {
@@ -239,9 +262,7 @@ struct Layer<'a, const F: usize> {
     /// Of each cell, and of one more.
     known: &'a [FaceMask],
     values: &'a [[Lanes; F]],
-    steepest: f32,
-    /// Fields that are continued; the others are as the first.
-    continued: usize,
+    slopes: [Slopes; F],
 }
 
 impl<const F: usize> Layer<'_, F> {
@@ -289,24 +310,29 @@ impl<const F: usize> Layer<'_, F> {
     fn gain(&self, line: &Line, n: u32, faces: FaceMask) -> Gain<F> {
         // Of neighbours with a known face behind them, and of the others.
         let (mut sums, mut counts) = ([[[0.0; 4]; F]; 2], [[0.0; 4]; 2]);
-        for [near, behind] in line.pairs(n, self.known.len() - 1) {
+        for [near, behind, third] in line.sides(n, self.known.len() - 1) {
             let known = faces & self.known[near];
             if known == 0 {
                 continue;
             }
             let linear = known & self.known[behind];
-            let (near, behind) = (&self.values[near], &self.values[behind]);
+            let is_third = linear & self.known[third];
+            let (near, behind, third) = (&self.values[near], &self.values[behind], &self.values[third]);
             if linear != 0 {
                 add_lanes(&mut counts[0], [1.0; 4], linear);
-                for field in 0..self.continued {
-                    let slope = |lane: usize| self.limited(near[field][lane] - behind[field][lane]);
+                for field in 0..F {
+                    let slopes = self.slopes[field];
+                    let slope = |lane: usize| {
+                        let next = (is_third >> lane & 1 == 1).then(|| behind[field][lane] - third[field][lane]);
+                        slopes.of(near[field][lane] - behind[field][lane], next)
+                    };
                     let values = std::array::from_fn(|lane| near[field][lane] + slope(lane));
                     add_lanes(&mut sums[0][field], values, linear);
                 }
             }
             if linear != known {
                 add_lanes(&mut counts[1], [1.0; 4], known & !linear);
-                for field in 0..self.continued {
+                for field in 0..F {
                     add_lanes(&mut sums[1][field], near[field], known & !linear);
                 }
             }
@@ -315,17 +341,8 @@ impl<const F: usize> Layer<'_, F> {
             let kind = usize::from(counts[0][lane] == 0.0);
             sums[kind][field][lane] / counts[kind][lane]
         };
-        let values = std::array::from_fn(|field| {
-            let field = if field < self.continued { field } else { 0 };
-            std::array::from_fn(|lane| mean(field, lane))
-        });
+        let values = std::array::from_fn(|field| std::array::from_fn(|lane| mean(field, lane)));
         Gain { at: line.at + n, faces, values }
-    }
-
-    #[inline(always)]
-    fn limited(&self, slope: f32) -> f32 {
-        let slope = if slope > self.steepest { self.steepest } else { slope };
-        if slope < -self.steepest { -self.steepest } else { slope }
     }
 }
 

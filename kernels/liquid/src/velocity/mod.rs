@@ -14,7 +14,7 @@ mod tests;
 
 pub use advect::{Advection, Scheme, Tracer};
 pub(crate) use around::Around;
-pub use extrapolate::{extrapolate, extrapolate_first};
+pub use extrapolate::{Slopes, extrapolate};
 pub use sampler::{Corners, Sampler, Site, trilinear};
 
 use numerics::vector::Vec3;

@@ -49,7 +49,7 @@ fn rigid_motion_is_continued_exactly() {
         given[axis].iter_mut().zip(unknown).filter(|(_, unknown)| *unknown).for_each(|(value, _)| *value = f32::NAN);
     }
     let mut twice = given.clone();
-    extrapolate(&rows, &mut known, [&mut given, &mut twice], 0.2, u32::MAX);
+    extrapolate(&rows, &mut known, [&mut given, &mut twice], [Slopes::nearest(0.2); 2], u32::MAX);
     assert!(known.iter().all(|mask| *mask == ALL_FACES) && given == twice);
     for (value, exact) in given.iter().flatten().zip(exact.iter().flatten()) {
         assert!((value - exact).abs() < 2e-4, "{value} {exact}");
@@ -64,7 +64,7 @@ fn single_faces_are_continued_as_they_are_and_slopes_are_bounded() {
     let mut fields: FaceFields<f32> = std::array::from_fn(|_| vec![0.0; rows.len()]);
     (known[at(0)], known[at(1)]) = (0b011, 0b001);
     (fields[0][at(0)], fields[0][at(1)], fields[1][at(0)]) = (1.0, 5.0, 3.0);
-    extrapolate(&rows, &mut known, [&mut fields], 0.5, u32::MAX);
+    extrapolate(&rows, &mut known, [&mut fields], [Slopes::nearest(0.5)], u32::MAX);
     assert_eq!([-2, -1, 2, 3].map(|x| fields[0][at(x)]), [0.0, 0.5, 5.5, 6.0]);
     assert!((-9..9).all(|x| fields[1][at(x)] == 3.0 && known[at(x)] == 0b011));
     // What cannot be reached stays as it is.
@@ -138,7 +138,7 @@ fn any_number_of_threads_gives_the_same_bits() {
             let rough = |p: Vec3| rigid(p.map(|x| x + 3.0 * numerics::trig::sin_cos(2.0 * x).0));
             let mut fields = faces(&rows, rough);
             let mut known = touching(&rows, &liquid);
-            extrapolate(&rows, &mut known, [&mut fields], 0.3, u32::MAX);
+            extrapolate(&rows, &mut known, [&mut fields], [Slopes::nearest(0.3)], u32::MAX);
             let velocity = MacVelocity::new(rows.clone(), fields);
             let bounds = [[-15.0; 3], [15.0; 3]];
             let carry = Advection {

@@ -1,4 +1,6 @@
 use super::*;
+use crate::marked::MarkedSurface;
+use crate::volumes::VolumeTargets;
 
 /// T = t·√(2g/a) and Z = front ÷ a of a column twice as high as its base a (Martin and Moyce 1952).
 const MEASURED: [(f64, f64); 8] =
@@ -20,7 +22,7 @@ fn front(view: &PhiView<'_>) -> f64 {
 }
 
 /// Kinetic and potential energy ÷ density · cell³, and the mean of x, in cells.
-fn energy_and_middle(liquid: &Liquid<PlainLevelSet>, domain: &Domain, cell: f64) -> [f64; 2] {
+fn energy_and_middle(liquid: &Liquid<MarkedSurface>, domain: &Domain, cell: f64) -> [f64; 2] {
     let (view, motion) = (liquid.surface().view(), liquid.motion());
     let [mut mass, mut height, mut middle] = [0.0; 3];
     for (at, [x, y, _]) in view.rows.iter().enumerate().filter(|(_, cell)| domain.contains(*cell)) {
@@ -45,13 +47,16 @@ fn energy_and_middle(liquid: &Liquid<PlainLevelSet>, domain: &Domain, cell: f64)
     [9.81 * height + motion_energy, middle / mass]
 }
 
-/// A level set alone loses and gains some volume; the limits on energy and volume leave room for that.
+/// With its volume kept, as the piece that sloshes: energy then shows what motion gains.
 #[test]
 fn a_dam_breaks_as_measured_and_then_sloshes() {
     let (base, cell) = (10.0_f32, 1.0 / 160.0);
     let domain = Domain::closed([0; 3], [50, 30, 2]);
     let block = block([-9.0; 3], [base, 2.0 * base, 9.0]);
-    let mut liquid = Liquid::new(LiquidSettings::new(domain, cell), PlainLevelSet::new(domain, block));
+    let settings = LiquidSettings::new(domain, cell);
+    let mut surface = MarkedSurface::new(domain, 1, block, 0, 1);
+    let mut targets = VolumeTargets::new(&mut surface, cell, None);
+    let mut liquid = Liquid::new(settings.clone(), surface);
     let unit = (f64::from(base) * cell / (2.0 * 9.81)).sqrt();
     let start = volume(&liquid.surface().view(), &domain);
     let [energy, _] = energy_and_middle(&liquid, &domain, cell);
@@ -59,6 +64,9 @@ fn a_dam_breaks_as_measured_and_then_sloshes() {
     for frame in 1..=170 {
         let report = liquid.step_frame(&FALLING, 0.1 * unit);
         assert!(report.max_divergence < 1e-4 && report.cfl_reached < 2.2, "{report:?}");
+        let (mut surface, motion) = liquid.into_parts();
+        targets.correct(&mut surface, None);
+        liquid = Liquid::resume(settings.clone(), surface, motion);
         let time = 0.1 * f64::from(frame);
         if time < 3.2 {
             let front = front(&liquid.surface().view()) / f64::from(base);
@@ -68,7 +76,7 @@ fn a_dam_breaks_as_measured_and_then_sloshes() {
         let [now, middle] = energy_and_middle(&liquid, &domain, cell);
         middles.push(middle);
         let kept = volume(&liquid.surface().view(), &domain) / start;
-        assert!(now < 1.03 * energy && (kept - 1.0).abs() < 0.12, "{time}: {now} {energy} {kept}");
+        assert!(now < 1.03 * energy && (kept - 1.0).abs() < 0.03, "{time}: {now} {energy} {kept}");
     }
     let at = |time: f64| {
         let next = fronts.partition_point(|(t, _)| *t < time);
