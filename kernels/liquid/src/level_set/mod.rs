@@ -17,7 +17,7 @@ mod sides;
 mod tests;
 mod view;
 
-use numerics::vector::{Vec3, add, length, scale, sub};
+use numerics::vector::{Vec3, add, dot, length, scale, sub};
 use serde::{Deserialize, Serialize};
 
 pub use refine::refined;
@@ -43,6 +43,10 @@ const ABOVE: [f32; 2] = [0.5, 1.5];
 
 /// The same above a thin solid: φ between these cells has nothing of what is in it, which may be of the other side.
 const ABOVE_THIN: [f32; 2] = [1.0, 2.0];
+
+/// How φ falls from a solid into the liquid, ÷ its slope: at the first share it does as where a flat surface meets the solid at an
+/// angle, at the second as over liquid that lies against it with all of its surface, which touches it.
+const LEANING: [f32; 2] = [-0.7, -0.9];
 
 /// Depth in a solid up to which φ is the liquid's own.
 const SKIN: f32 = 0.25;
@@ -343,9 +347,13 @@ fn continued(solid: &Distance<'_>, sampler: &mut PhiSampler<'_>, at: Vec3, depth
     if depth < SKIN && !sides.is_thin() {
         return own;
     }
-    let heights = if sides.is_thin() { ABOVE_THIN } else { ABOVE };
+    let is_thin = sides.is_thin();
     let mut of_side = |Sides { normal, depth, .. }: Sides| {
-        let [at_wall, slope] = at_surface(sampler, add(at, scale(normal, depth)), normal, heights);
+        let place = add(at, scale(normal, depth));
+        let [at_wall, slope] = match is_thin {
+            true => at_surface(sampler, place, normal),
+            false => at_thick(sampler, place, normal),
+        };
         at_wall - slope * depth
     };
     // Half-way, liquid on either side goes on, so that its surface is not on its own side of the solid.
@@ -360,16 +368,38 @@ fn parted(solid: &Distance<'_>, sampler: &mut PhiSampler<'_>, at: Vec3, height: 
     if sampler.at(sub(at, normal)) >= 0.0 || !may_be_thin(solid, at, height, normal) {
         return own;
     }
-    let is_film = at_surface(sampler, sub(at, scale(normal, height)), normal, ABOVE_THIN)[0] < 0.0;
+    let is_film = at_surface(sampler, sub(at, scale(normal, height)), normal)[0] < 0.0;
     if is_film { own } else { own.max(sampler.at(add(at, normal)).min(1.0)) }
 }
 
-/// φ at a place on a solid, and how it falls into it, as it is at these heights above. If positive, that at the lower one.
-fn at_surface(sampler: &mut PhiSampler<'_>, place: Vec3, normal: Vec3, heights: [f32; 2]) -> [f32; 2] {
-    let [near, far] = heights.map(|height| sampler.at(add(place, scale(normal, height))));
-    let slope = ((far - near) / (heights[1] - heights[0])).clamp(0.0, 1.0);
-    let at_wall = near - slope * heights[0];
+/// φ at a place on a thin solid, and how it falls into it, as it is above. If positive, that at the lower height.
+fn at_surface(sampler: &mut PhiSampler<'_>, place: Vec3, normal: Vec3) -> [f32; 2] {
+    let [near, far] = ABOVE_THIN.map(|height| sampler.at(add(place, scale(normal, height))));
+    let slope = ((far - near) / (ABOVE_THIN[1] - ABOVE_THIN[0])).clamp(0.0, 1.0);
+    let at_wall = near - slope * ABOVE_THIN[0];
     if at_wall < 0.0 { [at_wall, slope] } else { [near.max(f32::MIN_POSITIVE), 0.0] }
+}
+
+/// φ at a place on a thick solid, and how it falls into it. A flat surface stays flat in it, whether it leans over the liquid or
+/// away: pressure next to it knows where the surface is by φ in the solid, and any other would push liquid that is at rest.
+fn at_thick(sampler: &mut PhiSampler<'_>, place: Vec3, normal: Vec3) -> [f32; 2] {
+    let [near, far] = ABOVE.map(|height| sampler.at(add(place, scale(normal, height))));
+    let mut slope = ((far - near) / (ABOVE[1] - ABOVE[0])).clamp(-1.0, 1.0);
+    if slope < 0.0 {
+        let along = slope_of(sampler, add(place, normal));
+        let share = dot(along, normal) / length(along).max(f32::MIN_POSITIVE);
+        slope *= ((share - LEANING[1]) / (LEANING[0] - LEANING[1])).clamp(0.0, 1.0);
+    }
+    [near - slope * ABOVE[0], slope]
+}
+
+/// The gradient of φ.
+fn slope_of(sampler: &mut PhiSampler<'_>, at: Vec3) -> Vec3 {
+    [0, 1, 2].map(|axis| {
+        let (mut below, mut above) = (at, at);
+        (below[axis], above[axis]) = (at[axis] - 0.5, at[axis] + 0.5);
+        sampler.at(above) - sampler.at(below)
+    })
 }
 
 /// |φ| from which on a cell cannot come next to the surface in a step. φ may fall short of the distance by a fifth.

@@ -178,7 +178,7 @@ fn a_surface_goes_on_into_a_solid_and_ends_there() {
     let slope = |p: Vec3, by: f32| (p[1] - 8.0 - by * (p[0] - 6.0)) * 0.894_427_2;
     // Towards the wall it rises: straight on.
     let rising = met(|p| slope(p, -0.5), |p| p[0] - 6.0);
-    // Towards the wall it falls: at a right angle to it.
+    // Towards the wall it falls: straight on, too.
     let falling = met(|p| slope(p, 0.5), |p| p[0] - 6.0);
     for y in 6..11 {
         for x in 4..6 {
@@ -186,7 +186,7 @@ fn a_surface_goes_on_into_a_solid_and_ends_there() {
             // The normal of φ leaves the wall's: only its part along the wall's normal counts.
             let (up, down) = (rising([x, y, 3]), falling([x, y, 3]));
             assert!((up - on(-0.5, 6.5)).abs() < 1e-4 || up < on(-0.5, 6.5), "{x} {y}: {up}");
-            assert!((down - on(0.5, 6.5)).abs() < 1e-4, "{x} {y}: {down} {}", on(0.5, 6.5));
+            assert!((down - on(0.5, x as f32 + 0.5)).abs() < 1e-4, "{x} {y}: {down} {}", on(0.5, x as f32 + 0.5));
         }
         for at in [&rising as &dyn Fn(Cell) -> f32, &falling] {
             assert!((0..3).all(|x| at([x, y, 3]) > 0.0), "there is none deep inside");

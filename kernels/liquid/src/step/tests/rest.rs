@@ -1,4 +1,5 @@
 use super::*;
+use crate::marked::MarkedSurface;
 use numerics::vector::length;
 
 /// 240 frames of a pool whose surface lies at `depth` in a box of 16³ cells; the largest speed in them ÷ g·Δt, the largest
@@ -44,6 +45,34 @@ fn a_floor_that_cuts_cells_does_not_disturb_the_rest() {
     assert!(speed < 1e-5 && off < 1e-4, "{speed} {off}");
     let (speed, off, iterations) = rest(9.3, 0.0625, floor, 1e-4);
     assert!(speed < 1e-4 && off < 1e-3 && iterations < 240, "{speed} {off} {iterations}");
+}
+
+/// The largest speed in two seconds of a pool, 6 cells deep, that should rest; ÷ g·Δt.
+fn unrest(solid: &(dyn Fn(Vec3) -> f32 + Sync)) -> f64 {
+    let domain = Domain::closed([0; 3], [16, 10, 16]);
+    let mut surface = MarkedSurface::new(domain, 1, |p| p[1] - 6.0, 0, 1);
+    surface.meet(&|p| solid(p));
+    let mut liquid = Liquid::new(LiquidSettings::new(domain, 0.05), surface);
+    let distance = |_: f64, p: Vec3| solid(p);
+    let around = Surroundings { solid: Some(Solid::still(&distance)), ..FALLING };
+    let mut speed = 0.0_f64;
+    for _ in 0..48 {
+        liquid.step_frame(&around, 1.0 / 24.0);
+        speed = speed.max(largest(&liquid));
+    }
+    speed * 24.0 / 9.81
+}
+
+#[test]
+fn a_pool_rests_around_a_body_that_leans() {
+    let ball = |p: Vec3| length([p[0] - 8.0, p[1] - 7.6, p[2] - 8.0]) - 3.0;
+    let (sin, cos) = libm::sincosf(20.0_f32.to_radians());
+    let cylinder = |p: Vec3| {
+        let [x, y, z] = [p[0] - 8.0, p[1] - 5.0, p[2] - 8.0];
+        length([x, cos * z - sin * y, 0.0]) - 2.0
+    };
+    let speeds = [unrest(&ball), unrest(&cylinder)];
+    assert!(speeds.iter().all(|speed| *speed < 1e-4), "{speeds:?}");
 }
 
 /// ½g·t², in substeps of any length.
