@@ -48,11 +48,15 @@ fn rigid_motion_is_continued_exactly() {
         let unknown = known.iter().map(|mask| mask >> axis & 1 == 0);
         given[axis].iter_mut().zip(unknown).filter(|(_, unknown)| *unknown).for_each(|(value, _)| *value = f32::NAN);
     }
-    let mut twice = given.clone();
-    extrapolate(&rows, &mut known, [&mut given, &mut twice], [Slopes::nearest(0.2); 2], u32::MAX);
-    assert!(known.iter().all(|mask| *mask == ALL_FACES) && given == twice);
-    for (value, exact) in given.iter().flatten().zip(exact.iter().flatten()) {
-        assert!((value - exact).abs() < 2e-4, "{value} {exact}");
+    let mut smooth = given.clone();
+    let slopes = [Slopes::nearest(0.2), Slopes { steepest: 0.2, smooth: true }];
+    extrapolate(&rows, &mut known, [&mut given, &mut smooth], slopes, u32::MAX);
+    assert!(known.iter().all(|mask| *mask == ALL_FACES));
+    // What rounding makes of differences that are the same counts as rough.
+    for (field, most) in [(&given, 2e-4), (&smooth, 4e-4)] {
+        for (value, exact) in field.iter().flatten().zip(exact.iter().flatten()) {
+            assert!((value - exact).abs() < most, "{value} {exact}");
+        }
     }
 }
 
@@ -69,6 +73,28 @@ fn single_faces_are_continued_as_they_are_and_slopes_are_bounded() {
     assert!((-9..9).all(|x| fields[1][at(x)] == 3.0 && known[at(x)] == 0b011));
     // What cannot be reached stays as it is.
     assert_eq!((known[rows.len() - 1], fields[0][rows.len() - 1]), (0, 0.0));
+}
+
+/// The faces at x = 3, 4 and 5 that follow those with the values `given` at x = 0, 1 and 2, the first two by `slopes`.
+fn after(given: [f32; 3], slopes: Slopes) -> [f32; 3] {
+    let rows = CellRows::from_cells(&(0..6).map(|x| [x, 0, 0]).collect::<Vec<_>>());
+    let mut known = vec![0b001, 0b001, 0b001, 0, 0, 0];
+    let mut fields: FaceFields<f32> = std::array::from_fn(|_| vec![0.0; rows.len()]);
+    fields[0][..3].copy_from_slice(&given);
+    extrapolate(&rows, &mut known, [&mut fields], [slopes], 2);
+    [3, 4, 5].map(|at| fields[0][at])
+}
+
+#[test]
+fn only_smooth_fields_slope_and_not_far() {
+    let smooth = Slopes { steepest: 10.0, smooth: true };
+    assert_eq!(after([1.0, 2.0, 3.0], smooth), [4.0, 5.0, 5.0]);
+    // Differences of 4 and 5: 4, less 3 · (5 − 4) ÷ (5 + 4) of it.
+    assert!((after([0.0, 4.0, 9.0], smooth)[0] - (9.0 + 4.0 * 2.0 / 3.0)).abs() < 1e-5);
+    for rough in [[0.0, 1.0, 3.0], [0.0, 2.0, 3.0], [0.0, 2.0, 1.0], [0.0, 0.0, 1.0]] {
+        assert_eq!(after(rough, smooth), [rough[2]; 3], "{rough:?}");
+    }
+    assert_eq!(after([0.0, 1.0, 3.0], Slopes::nearest(1.5)), [4.5, 6.0, 6.0]);
 }
 
 fn turned([x, y, z]: Vec3, angle: f32) -> Vec3 {
