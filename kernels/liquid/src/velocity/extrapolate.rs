@@ -1,7 +1,7 @@
 //! Velocity continued past the faces where it is known.
 //!
 //! Layer by layer outward, an unknown face takes the mean of what its known neighbours say: a neighbour with another
-//! known face behind it, on the same line, continues linearly; only where no neighbour has one do they say what they are
+//! known face behind it, or two, on the same line, continues linearly; only where no neighbour has do they say what they are
 //! themselves. Linear fields, rigid rotation among them, are continued exactly.
 
 use std::mem::replace;
@@ -66,8 +66,8 @@ impl Line {
 pub struct Slopes {
     /// What they count as at most, which bounds what a rough field grows to.
     pub steepest: f32,
-    /// Whether only those of smooth fields count: all of a difference that is the same as the next, nothing of one that is
-    /// twice the next, half of it, or the only one.
+    /// Whether only those of smooth fields are: all of a difference that is the same as the next, nothing of one that is twice the
+    /// next or half of it.
     pub smooth: bool,
 }
 
@@ -81,15 +81,15 @@ impl Slopes {
     }
 
     #[inline(always)]
-    fn of(self, nearest: f32, next: Option<f32>) -> f32 {
-        let slope = match next {
-            _ if !self.smooth => nearest,
-            Some(next) if nearest * next > 0.0 => {
+    fn of(self, nearest: f32, next: f32) -> f32 {
+        let slope = match self.smooth {
+            true if nearest * next > 0.0 => {
                 let [less, more] = if nearest.abs() < next.abs() { [nearest, next] } else { [next, nearest] };
                 let rough = 3.0 * (more - less) / (more + less);
                 if rough < 1.0 { less * (1.0 - rough) } else { 0.0 }
             }
-            _ => 0.0,
+            true => 0.0,
+            false => nearest,
         };
         let slope = if slope > self.steepest { self.steepest } else { slope };
         if slope < -self.steepest { -self.steepest } else { slope }
@@ -308,38 +308,35 @@ impl<const F: usize> Layer<'_, F> {
 
     #[inline(always)]
     fn gain(&self, line: &Line, n: u32, faces: FaceMask) -> Gain<F> {
-        // Of neighbours with a known face behind them, and of the others.
-        let (mut sums, mut counts) = ([[[0.0; 4]; F]; 2], [[0.0; 4]; 2]);
+        // Of neighbours with as many known faces behind them as slopes need, and of the others.
+        let (mut sums, mut counts) = ([[[0.0; 4]; 2]; F], [[[0.0; 4]; 2]; F]);
         for [near, behind, third] in line.sides(n, self.known.len() - 1) {
             let known = faces & self.known[near];
             if known == 0 {
                 continue;
             }
-            let linear = known & self.known[behind];
-            let is_third = linear & self.known[third];
+            let pairs = known & self.known[behind];
+            let triples = pairs & self.known[third];
             let (near, behind, third) = (&self.values[near], &self.values[behind], &self.values[third]);
-            if linear != 0 {
-                add_lanes(&mut counts[0], [1.0; 4], linear);
-                for field in 0..F {
-                    let slopes = self.slopes[field];
-                    let slope = |lane: usize| {
-                        let next = (is_third >> lane & 1 == 1).then(|| behind[field][lane] - third[field][lane]);
-                        slopes.of(near[field][lane] - behind[field][lane], next)
-                    };
+            for (field, slopes) in self.slopes.iter().enumerate() {
+                let linear = if slopes.smooth { triples } else { pairs };
+                let slope = |lane: usize| {
+                    slopes.of(near[field][lane] - behind[field][lane], behind[field][lane] - third[field][lane])
+                };
+                if linear != 0 {
                     let values = std::array::from_fn(|lane| near[field][lane] + slope(lane));
-                    add_lanes(&mut sums[0][field], values, linear);
+                    add_lanes(&mut counts[field][0], [1.0; 4], linear);
+                    add_lanes(&mut sums[field][0], values, linear);
                 }
-            }
-            if linear != known {
-                add_lanes(&mut counts[1], [1.0; 4], known & !linear);
-                for field in 0..F {
-                    add_lanes(&mut sums[1][field], near[field], known & !linear);
+                if linear != known {
+                    add_lanes(&mut counts[field][1], [1.0; 4], known & !linear);
+                    add_lanes(&mut sums[field][1], near[field], known & !linear);
                 }
             }
         }
         let mean = |field: usize, lane: usize| {
-            let kind = usize::from(counts[0][lane] == 0.0);
-            sums[kind][field][lane] / counts[kind][lane]
+            let kind = usize::from(counts[field][0][lane] == 0.0);
+            sums[field][kind][lane] / counts[field][kind][lane]
         };
         let values = std::array::from_fn(|field| std::array::from_fn(|lane| mean(field, lane)));
         Gain { at: line.at + n, faces, values }

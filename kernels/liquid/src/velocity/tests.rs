@@ -52,10 +52,12 @@ fn rigid_motion_is_continued_exactly() {
     let slopes = [Slopes::nearest(0.2), Slopes { steepest: 0.2, smooth: true }];
     extrapolate(&rows, &mut known, [&mut given, &mut smooth], slopes, u32::MAX);
     assert!(known.iter().all(|mask| *mask == ALL_FACES));
-    // What rounding makes of differences that are the same counts as rough.
-    for (field, most) in [(&given, 2e-4), (&smooth, 4e-4)] {
-        for (value, exact) in field.iter().flatten().zip(exact.iter().flatten()) {
-            assert!((value - exact).abs() < most, "{value} {exact}");
+    // Far out, what rounding makes of differences that are the same counts as rough.
+    let (near, everywhere) = (ball(6.3, 3), ball(6.3, 7));
+    for (field, within) in [(&given, &everywhere), (&smooth, &near)] {
+        for (at, cell) in rows.iter().enumerate().filter(|(_, cell)| within.find(*cell).is_some()) {
+            let [value, exact] = [field, &exact].map(|faces| [0, 1, 2].map(|axis| faces[axis][at]));
+            assert!((0..3).all(|axis| (value[axis] - exact[axis]).abs() < 2e-4), "{cell:?}: {value:?} {exact:?}");
         }
     }
 }
