@@ -16,6 +16,7 @@ mod runs;
 mod sources;
 mod spin;
 mod tank;
+mod thin;
 mod viscous;
 
 use super::*;
