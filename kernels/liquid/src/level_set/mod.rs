@@ -356,9 +356,8 @@ fn continued(solid: &Distance<'_>, sampler: &mut PhiSampler<'_>, at: Vec3, depth
         };
         at_wall - slope * depth
     };
-    // Half-way, liquid on either side goes on, so that its surface is not on its own side of the solid.
     let own_side = of_side(sides);
-    sides.other().map_or(own_side, |other| own_side.min(of_side(other)))
+    if sides.is_thin() { sides.joined([own_side, of_side(sides.other())]) } else { own_side }
 }
 
 /// φ at a place without liquid, `height` above a solid: without what is on the other side, where that is thin. Else each

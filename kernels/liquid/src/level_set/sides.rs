@@ -112,10 +112,26 @@ impl Sides {
         })
     }
 
-    /// The same seen from the other side, for a place half-way between both.
-    pub(crate) fn other(&self) -> Option<Self> {
-        let is_middle = self.behind - self.depth < MIDDLE;
-        is_middle.then(|| Self { normal: scale(self.normal, -1.0), depth: self.behind, behind: self.depth })
+    /// The same seen from the other side.
+    pub(crate) fn other(&self) -> Self {
+        Self { normal: scale(self.normal, -1.0), depth: self.behind, behind: self.depth }
+    }
+
+    /// φ here, given how the liquid of each side goes on, that of the closer side first. Where only one side is wet, the
+    /// surface is half-way, and φ the distance from there: with other values a mesh would enclose more or less as soon as
+    /// φ becomes a distance.
+    pub(super) fn joined(&self, [own, other]: [f32; 2]) -> f32 {
+        let apart = self.behind - self.depth;
+        if apart < MIDDLE {
+            // Liquid on either side goes on, so that its surface is not on its own side of the solid.
+            let wetter = own.min(other);
+            return if own < 0.0 && other < 0.0 { wetter } else { wetter.max(-1.0) };
+        }
+        match (own < 0.0, other < 0.0) {
+            (true, true) => own,
+            (true, false) => own.max(-0.5 * apart),
+            (false, _) => own.min(other.max(0.0) + 0.5 * apart),
+        }
     }
 
     /// Whether liquid on one side could reach the other.

@@ -23,7 +23,7 @@ const IMAGES: i32 = 8;
 const INSIDE: f32 = 1.0;
 
 /// Cosine between the normals of a marker and of a thin solid from which it faces a side.
-const FACING: f32 = 0.7;
+const FACING: f32 = 0.5;
 
 /// Thickness of a film on a solid, in surface cells, from which a mesh of these cells shows it without holes: more than the
 /// diagonal of a cell.
@@ -39,8 +39,11 @@ const RISE: [f32; 2] = [0.2, 0.5];
 const RISE_OF_EVEN: [f32; 2] = [0.8, 0.95];
 
 /// How much larger φ is a cell farther out of a solid from which on it is no distance: what is in the solid then belongs to its
-/// other side, up to the middle of a wall that has moved since.
+/// other side, up to the middle of a wall that has moved since. Of a thin solid, it does where φ is not below 0 on its surface.
 const STEEP: f32 = 1.5;
+
+/// Height, in surface cells, of a place that is outside the solid where a side of it is as close as its distance says.
+const CLEAR: f32 = 0.5;
 
 /// How far to look for a shore, in surface cells, towards where liquid gets thinner: at a shore the solid is dry there, in a
 /// groove it is not.
@@ -165,8 +168,13 @@ impl MarkedSurface {
                 let is_thin = inside < 0.5 * FILM;
                 let is_even = is_thin || is_shore(&distance, sampler, at, normal);
                 let [least, most] = if is_even { RISE_OF_EVEN } else { RISE };
-                let is_other_side = height < 0.0 && rise > STEEP && !is_thin;
-                let share = if is_other_side { 0.0 } else { ((rise - least) / (most - least)).clamp(0.0, 1.0) };
+                let mut share = ((rise - least) / (most - least)).clamp(0.0, 1.0);
+                if share > 0.0 && height < 0.0 {
+                    let is_other_side = if is_thin { phi >= rise * height } else { rise > STEEP };
+                    // In a corner no side is as close as the distance says.
+                    let is_corner = || distance(add(at, scale(normal, CLEAR - height))) < 0.0;
+                    share = if is_other_side || is_corner() { 0.0 } else { share };
+                }
                 let wanted = share * (FILM - thickness);
                 // Half the thickness of the solid, where that is less than a film reaches.
                 depth = wanted.min(0.5 * (FILM + inside) - APART).max(0.0);

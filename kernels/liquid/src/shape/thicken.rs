@@ -27,6 +27,9 @@ const SIDEWAYS: f32 = 1.75;
 /// Cosine of the angle between normals from which two sides are opposite.
 const OPPOSITE: f32 = -0.5;
 
+/// Distance from a surface, in cells, up to which the way to it is rounding: its triangle says where it faces.
+const ON_SURFACE: f32 = 1e-2;
+
 /// Half of the thickness that a plane needs.
 fn half_thickness(normal: Option<Vec3>) -> f32 {
     let [x, y, z] = normal.unwrap_or([1.0 / 1.732_050_8; 3]).map(f32::abs);
@@ -80,7 +83,7 @@ struct Solid<'a, N> {
 impl<N: Fn(u32) -> Vec3> Solid<'_, N> {
     /// The normal, out of the solid, at the closest point of a cell; `None` on a triangle without area.
     fn outward(&self, at: usize) -> Option<Vec3> {
-        if self.distance[at] == 0.0 {
+        if self.distance[at].abs() < ON_SURFACE {
             return unit((self.normal)(self.feet[at].triangle));
         }
         let away = sub(middle(self.cells[at]), self.feet[at].point);

@@ -17,6 +17,7 @@ mod sources;
 mod spin;
 mod splash;
 mod tank;
+mod thin;
 mod viscous;
 
 use super::*;
