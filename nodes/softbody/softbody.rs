@@ -240,6 +240,12 @@ metrics! { METRICS:
          and other bodies. 0 until all that started inside has been pushed out.")
         .warn_above(0.0, "Surfaces went through each other. Set more `substeps`, slow the colliders, leave more room \
             between them, or raise `thickness`.");
+    SELF_CROSSINGS = Metric::new("self_crossings", Unit::None,
+        "Edges of bodies' surfaces in the output that go through the surface of the same body; those that do at rest are left \
+         out.")
+        .warn_above(0.0, "The surface of a body goes through itself at these frames, and may stay so. Turn `self_collision` \
+            on if it is off. Otherwise set `substeps` to 8 or more, or `integrator` to `accurate`, from a few frames before \
+            the first of them, or raise `stiffness`, so that the body folds less.");
     JAMMED = Metric::new("jammed", Unit::None,
         "Contacts with colliders less than twice `thickness` above the ground, which leave a body no room.")
         .warn_above(0.0, "A collider closes on the ground with a body between, where there is no room for it. It counts \
