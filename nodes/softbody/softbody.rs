@@ -210,6 +210,10 @@ metrics! { METRICS:
          350 Newton iterations or more.")
         .warn_above(0.0, "So much is in contact that there is no time for bounces at these frames: bodies lose more speed \
             than their material would. Set `substeps` to pay for them, or `bounce` to 0 if they need not bounce.");
+    FAST_TURNS = Metric::new("fast_turns", Unit::None,
+        "Time steps in which a collider near a body turns by more than 60 degrees.")
+        .warn_above(0.0, "A collider turns so far within a time step at these frames that it may pass bodies untouched. Set \
+            `substeps` to 0, which takes steps in which it turns by 60 degrees at most, or to a larger number.");
     VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume of the tets relative to that at rest.")
         .warn_outside(0.9, 1.1, "The bodies lose or gain more than a tenth of their volume. Raise `volume`, or \
             `stiffness`; look for colliders that squeeze them into too small a space.");
@@ -332,7 +336,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
-    12,
+    13,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
      other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
      pins hold them. `stiffness` has the same effect at any mesh resolution as long as tets are about as wide as long \
