@@ -210,6 +210,10 @@ metrics! { METRICS:
          350 Newton iterations or more.")
         .warn_above(0.0, "So much is in contact that there is no time for bounces at these frames: bodies lose more speed \
             than their material would. Set `substeps` to pay for them, or `bounce` to 0 if they need not bounce.");
+    FAST_TURNS = Metric::new("fast_turns", Unit::None,
+        "Time steps in which a collider near a body turns by more than 60 degrees.")
+        .warn_above(0.0, "A collider turns so far within a time step at these frames that it may pass bodies untouched. Set \
+            `substeps` to 0, which takes steps in which it turns by 60 degrees at most, or to a larger number.");
     VOLUME_RATIO = Metric::new("volume_ratio", Unit::None, "Volume of the tets relative to that at rest.")
         .warn_outside(0.9, 1.1, "The bodies lose or gain more than a tenth of their volume. Raise `volume`, or \
             `stiffness`; look for colliders that squeeze them into too small a space.");
@@ -240,6 +244,12 @@ metrics! { METRICS:
          and other bodies. 0 until all that started inside has been pushed out.")
         .warn_above(0.0, "Surfaces went through each other. Set more `substeps`, slow the colliders, leave more room \
             between them, or raise `thickness`.");
+    SELF_CROSSINGS = Metric::new("self_crossings", Unit::None,
+        "Edges of bodies' surfaces in the output that go through the surface of the same body; those that do at rest are left \
+         out.")
+        .warn_above(0.0, "The surface of a body goes through itself at these frames, and may stay so. Turn `self_collision` \
+            on if it is off. Otherwise set `substeps` to 8 or more, or `integrator` to `accurate`, from a few frames before \
+            the first of them, or raise `stiffness`, so that the body folds less.");
     JAMMED = Metric::new("jammed", Unit::None,
         "Contacts with colliders less than twice `thickness` above the ground, which leave a body no room.")
         .warn_above(0.0, "A collider closes on the ground with a body between, where there is no room for it. It counts \
@@ -326,7 +336,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
-    12,
+    13,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
      other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
      pins hold them. `stiffness` has the same effect at any mesh resolution as long as tets are about as wide as long \

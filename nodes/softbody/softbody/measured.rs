@@ -4,8 +4,9 @@ use bodies::mass_spring::{FrameReport, State};
 use engine::prelude::*;
 
 use super::{
-    CAPS_HIT, CG, CONTACTS, ELASTIC, ENERGY_LOST, ENERGY_SHED, ERROR_ESTIMATE, GOAL_ENERGY, INVERTED_TETS, JAMMED,
-    KINETIC, NEWTON, RESIDUAL, SUBSTEPS_USED, TOLERANCE_MISSED, TORN, UNCUT_IMPACTS, VOLUME_RATIO, WORST_STRETCH,
+    CAPS_HIT, CG, CONTACTS, ELASTIC, ENERGY_LOST, ENERGY_SHED, ERROR_ESTIMATE, FAST_TURNS, GOAL_ENERGY, INVERTED_TETS,
+    JAMMED, KINETIC, NEWTON, RESIDUAL, SUBSTEPS_USED, TOLERANCE_MISSED, TORN, UNCUT_IMPACTS, VOLUME_RATIO,
+    WORST_STRETCH,
 };
 
 /// The metrics of a frame that the solver alone determines.
@@ -22,6 +23,7 @@ pub(super) fn measured(report: &FrameReport, state: &State) -> MetricValues {
     metrics.set(GOAL_ENERGY, report.goal_energy);
     metrics.set(ENERGY_SHED, report.energy_removed);
     metrics.set(ENERGY_LOST, report.energy_lost);
+    metrics.set(FAST_TURNS, report.fast_turns);
     metrics.set(UNCUT_IMPACTS, report.uncut_impacts);
     metrics.set(VOLUME_RATIO, report.volume_ratio);
     metrics.set(WORST_STRETCH, report.worst_stretch);

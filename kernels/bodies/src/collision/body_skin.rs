@@ -22,7 +22,7 @@ pub struct BodySkin {
     pub(super) surface: TriangleSurface,
     pub(super) faces: SweptElements<3>,
     pub(super) edges: SweptElements<2>,
-    rest: Vec<[f64; 3]>,
+    pub(super) rest: Vec<[f64; 3]>,
     /// Mean rest length of the edges, metres.
     mean: f64,
     /// Contact points that meet the ground, obstacles and other skins, ascending: those of the surface and the particles

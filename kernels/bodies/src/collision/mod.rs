@@ -53,6 +53,8 @@ const POINTS: usize = 1024;
 const REACH: f64 = 2.0;
 /// Largest deviation of a rotating obstacle from linear motion between sampled poses, as a fraction of the gap.
 const SAG: f64 = 0.25;
+/// Angle by which an obstacle near a body may turn in a step, radians: what it has met is beyond its plane after half a turn.
+const FARTHEST_TURN: f64 = std::f64::consts::FRAC_PI_3;
 
 /// Distance along its normal, in gaps, by which an obstacle has to be raised above the ground to leave no room.
 const JAMMED: f64 = 0.5;
@@ -165,6 +167,26 @@ impl ContactFinder for CollisionScene<'_> {
         }
         self.pairs(query, &boxes, out);
     }
+
+    fn least_steps(&self, query: &ContactQuery<'_>) -> u32 {
+        let mut least = 1;
+        for obstacle in self.obstacles {
+            let steps = (obstacle.motion.turn(query.times) / FARTHEST_TURN).ceil() as u32;
+            if steps <= least {
+                continue;
+            }
+            let poses = obstacle.motion.times(query.times, SAG * obstacle.thickness);
+            let poses: Vec<Vec<[f64; 3]>> = poses.iter().map(|time| obstacle.at(*time)).collect();
+            let passed = swept::swept_boxes(&poses.iter().map(Vec::as_slice).collect::<Vec<_>>());
+            let passed = swept::bounds_of_finite(&obstacle.surface.vertices, &passed);
+            let boxes = swept::swept_boxes(&[query.from, query.to]);
+            let is_near = |skin: &BodySkin| swept::overlap(&swept::bounds_of_finite(&skin.touching, &boxes), &passed);
+            if self.skins.iter().any(is_near) {
+                least = steps;
+            }
+        }
+        least
+    }
 }
 
 impl CollisionScene<'_> {
@@ -182,7 +204,7 @@ impl CollisionScene<'_> {
                 }
                 let depth = (ground.thickness - before).max(0.0);
                 let (allowed, speed) = rising.map_or((0.0, 0.0), |overlap| self.allowed(overlap, depth, query.times));
-                out.push(yielding.of(Contact {
+                let contact = yielding.of(Contact {
                     points: [*particle, 0, 0, 0],
                     weights: [1.0, 0.0, 0.0, 0.0],
                     normal: ground.up,
@@ -192,7 +214,9 @@ impl CollisionScene<'_> {
                     friction: ground.friction * self.friction_scale(&[*particle], &[1.0]),
                     jammed: false,
                     open: false,
-                }));
+                });
+                // Contacts yield as they do with what has an inside.
+                out.push(Contact { open: true, ..contact });
             }
         }
     }

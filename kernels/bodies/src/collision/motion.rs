@@ -87,6 +87,15 @@ impl Motion {
         displacement / (self.poses[index + 1].share - self.poses[index].share)
     }
 
+    /// The angle by which it turns between two `times`, radians.
+    pub(super) fn turn(&self, times: [f64; 2]) -> f64 {
+        let of = |(interval, pair): (&PoseInterval, &[ObstaclePose])| {
+            let shared = pair[1].share.min(times[1]) - pair[0].share.max(times[0]);
+            interval.angle * shared.max(0.0) / (pair[1].share - pair[0].share)
+        };
+        self.intervals.iter().zip(self.poses.windows(2)).map(of).sum()
+    }
+
     /// Times from the first to the second of `times`, close enough that between them no point deviates from a
     /// straight line by more than `allowed`.
     pub(super) fn times(&self, times: [f64; 2], allowed: f64) -> Vec<f64> {

@@ -1,10 +1,10 @@
 //! Edges of one surface that go through another, which no point shows: a thin rod through the face of a coarse mesh, say.
 //!
-//! Limit: bodies are not tested against themselves.
+//! Limit: how deep a body goes through itself is not measured, only by how many edges.
 
 use super::obstacle::narrow;
 use super::surface::{Edge, Moment, TriangleSurface};
-use super::{CollisionScene, Overlap, OverlapPartner, TASK, overlap};
+use super::{BodySkin, CollisionScene, Overlap, OverlapPartner, TASK, overlap};
 use numerics::parallel;
 use numerics::swept::{self, SweptBoxTree, SweptElements};
 use numerics::tree::{Cuboid, TriangleTree};
@@ -119,6 +119,33 @@ impl CollisionScene<'_> {
             }
         }
         found
+    }
+
+    /// Number of edges of skins that go through a triangle of the same skin, with contact points at `x`. Triangles with a
+    /// point in common with the edge do not count, nor do those that it goes through at rest.
+    pub fn self_crossings(&self, x: &[[f64; 3]]) -> usize {
+        let (boxes, at) = (swept::swept_boxes(&[x]), Moment::of(x));
+        let of_skin = |skin: &BodySkin| -> usize {
+            let (surface, tree, rest) = (&skin.surface, skin.faces.sweep(&boxes, 0.0), Moment::of(&skin.rest));
+            let crosses = |edge: &Edge, face: u32, at: &Moment<'_>| {
+                crossing(edge.ends.map(|end| at.position(end)), surface.corners(at, face)).is_some()
+            };
+            let goes_through = |edge: &Edge, faces: &mut Vec<u32>| {
+                tree.overlapping(&swept::bounds_of(&edge.ends, &boxes), faces);
+                faces.iter().any(|face| {
+                    let corners = surface.triangles[*face as usize];
+                    !edge.ends.iter().any(|end| corners.contains(end))
+                        && crosses(edge, *face, &at)
+                        && !crosses(edge, *face, &rest)
+                })
+            };
+            let counts = parallel::map(surface.edges.chunks(TASK), |_, edges| {
+                let mut faces = Vec::new();
+                edges.iter().filter(|edge| goes_through(edge, &mut faces)).count()
+            });
+            counts.into_iter().sum()
+        };
+        self.skins.iter().map(of_skin).sum()
     }
 
     /// The edges of a skin that go through the surface of an obstacle, with contact points at `x` and the obstacle at the end

@@ -145,7 +145,8 @@ impl Stepper<'_> {
         };
         let is_held = |piece: &std::ops::Range<usize>| self.context.external.held[piece.clone()].contains(&true);
         let pieces = body.order.pieces.iter().enumerate();
-        let free = pieces.filter(|(index, piece)| touched[*index] >= 0.0 && !is_held(piece));
+        let is_heap = |piece| self.solver.heaps.get(body.particles(piece).start) == Some(&true);
+        let free = pieces.filter(|(index, piece)| touched[*index] >= 0.0 && !is_held(piece) && !is_heap(piece));
         free.map(of_piece).fold(0.0, f64::max)
     }
 }

@@ -252,7 +252,11 @@ impl SoftBody {
     /// E ÷ (ρgh) of the piece that carries its own weight worst, with h its height at rest along `gravity`, m/s²;
     /// infinite without weight.
     pub fn stiffness_to_weight(&self, gravity: [f64; 3]) -> f64 {
-        let gravity = DVec3::from(gravity);
+        self.stiffness_to_weights(gravity.into()).into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    /// The same of each piece.
+    pub(super) fn stiffness_to_weights(&self, gravity: DVec3) -> Vec<f64> {
         let mut stiff = vec![0.0; self.len()];
         for ((tet, volume), modulus) in self.tets.iter().zip(&self.volumes).zip(&self.moduli) {
             stiff[tet[0] as usize] += volume * modulus;
@@ -264,7 +268,7 @@ impl SoftBody {
                 along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
             stiff[particles.clone()].iter().sum::<f64>() / (self.mass_of(particles) * (high - low))
         };
-        self.order.pieces.iter().map(ratio).fold(f64::INFINITY, f64::min)
+        self.order.pieces.iter().map(ratio).collect()
     }
 
     /// The particles of a piece.

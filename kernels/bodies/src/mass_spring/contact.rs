@@ -1,6 +1,6 @@
 //! Contact and Coulomb friction: the interface to contact detection, the contact forces, and their linearisation.
 //!
-//! Once a stage the solver asks a [`ContactFinder`] for all potential contacts. Each becomes a one-sided penalty
+//! Once a stage the solver asks a [`super::ContactFinder`] for all potential contacts. Each becomes a one-sided penalty
 //! spring that acts below the gap and grows without bound as the surfaces meet: N = κδ ÷ (1 − δ/gap), treated
 //! implicitly like every other force. Friction is Coulomb's law, regularised by a creep velocity of [`CREEP`] body
 //! lengths a second and implicit too; the normal load it uses is that of the previous step until the current step has
@@ -9,15 +9,14 @@
 //! Limit: within a stage the surfaces of a contact are planes.
 
 use super::body::SoftBody;
+use super::heap::ContactScale;
 use super::volume::continued;
 use crate::embedding::EmbeddedPoint;
 use numerics::vector::DVec3;
 
-/// Penalty stiffness κ ÷ effective stiffness of the particles, springs and inertia together. Larger values keep the
-/// gap better in one iteration, smaller ones converge faster.
+/// Penalty stiffness κ ÷ resistance of the particles. Larger values keep the gap better, smaller ones converge faster.
 const PENALTY_RATIO: f64 = 30.0;
-/// Upper bound on the friction coefficient of a slip rate: slip of one frame is resisted by at most this times κ.
-/// Limits friction coefficients like 1e6, which would only add noise.
+/// Slip of one frame is resisted by at most this times κ: friction coefficients like 1e6 would only add noise.
 const STICK_RATIO: f64 = 1e4;
 /// Fraction of the gap beyond which the contact force continues linearly; its slope there is 1/(1 − this)² of the
 /// initial one.
@@ -28,13 +27,11 @@ const TOO_DEEP: f64 = 0.96;
 /// contact that was open, and for one that was closed.
 const OPEN_LIMIT: [f64; 2] = [0.05, 0.02];
 const CLOSED_LIMIT: [f64; 2] = [0.3, 0.1];
-/// Factor on the friction dual of a predicted slip, which keeps it away from the boundary, where the slip direction
-/// could flip.
+/// Factor on the friction dual of a predicted slip, which keeps it off the boundary, where the slip could flip.
 const DUAL_SHRINK: f64 = 0.98;
 /// Two unit vectors with a sum shorter than this are opposite.
 const OPPOSITE: f64 = 1e-9;
-/// Cosine of the largest angle by which slip may turn in a step with constant friction. With a right angle, a point may go
-/// round and round.
+/// Cosine of the largest angle by which slip may turn in a step with constant friction; at a right angle it goes round.
 const SAME_DIRECTION: f64 = 0.7;
 /// Slip, in body lengths a second, above which friction is μN; proportional below.
 const CREEP: f64 = 2e-5;
@@ -59,7 +56,8 @@ pub struct Contact {
     pub friction: f64,
     /// Whether the obstacle leaves no room between it and the ground, so that nothing can meet both.
     pub jammed: bool,
-    /// Whether the obstacle has no inside, so that positions do not tell the side of what went through it.
+    /// Whether what a step leaves too deep is moved back: positions do not tell the side of what went through an obstacle
+    /// without an inside, and nothing else holds up what is below the ground.
     pub open: bool,
 }
 
@@ -70,25 +68,6 @@ impl Contact {
         let at: DVec3 = sides.map(|(particle, weight)| DVec3::from(x[*particle as usize]) * weight).sum();
         self.gap + self.offset - DVec3::from(self.normal).dot(&at)
     }
-}
-
-/// A motion for which potential contacts are wanted: contact points move linearly from `from` to `to`. Contact points are
-/// the particles, by the caller's indices, and after them the points that ride along ([`super::Mesh::riding`]).
-#[derive(Clone, Copy, Debug)]
-pub struct ContactQuery<'a> {
-    /// Positions at the first of `times`, metres.
-    pub from: &'a [[f64; 3]],
-    /// Expected positions at the second; contact planes hold for that time.
-    pub to: &'a [[f64; 3]],
-    /// Start and end, as fractions of the frame.
-    pub times: [f64; 2],
-}
-
-/// Contact detection as the solver needs it.
-pub trait ContactFinder: Sync {
-    /// Adds all potential contacts to `out`, in a fixed order: pairs that touch, and pairs that come closer than
-    /// twice the gap during the motion.
-    fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>);
 }
 
 /// The most particles of a contact: each of its points may ride along on four.
@@ -112,6 +91,8 @@ pub(super) struct ContactConstraint {
     pub(super) friction: f64,
     jammed: bool,
     pub(super) open: bool,
+    /// Whether it is between skin of heaps, or of one and another body: any depth is accepted.
+    pub(super) of_heap: bool,
     /// Penalty stiffness κ, N/m.
     penalty_stiffness: f64,
     /// Largest resistance of friction to a slip rate, N·s/m.
@@ -164,9 +145,8 @@ pub(super) struct ContactState {
 }
 
 impl ContactConstraint {
-    /// A detected contact, for frames of `seconds`. `particle_stiffness` is the sum of spring stiffnesses at each
-    /// particle. `None` if it is degenerate.
-    pub(super) fn new(body: &SoftBody, contact: &Contact, seconds: f64, particle_stiffness: &[f64]) -> Option<Self> {
+    /// A detected contact, as stiff as the `scale` tells. `None` if it is degenerate.
+    pub(super) fn new(body: &SoftBody, contact: &Contact, scale: &ContactScale<'_>) -> Option<Self> {
         let finite = contact.weights.iter().chain(&contact.normal).chain(&contact.velocity).all(|x| x.is_finite());
         let normal = DVec3::from(contact.normal).try_normalize(1e-12)?;
         if !finite || !contact.offset.is_finite() || !contact.gap.is_finite() {
@@ -188,12 +168,13 @@ impl ContactConstraint {
                 constraint.add_point(body, k, contact.points[k] as usize)?;
             }
         }
-        let yielding = constraint.sides().fold(0.0, |sum, (particle, weight)| {
-            let stiff = 4.0 * body.mass[particle] / (seconds * seconds) + particle_stiffness[particle] / 3.0;
-            sum + weight * weight / stiff
-        });
+        let (gap, two_sided) = (constraint.gap, constraint.is_two_sided());
+        let stiff = |particle| scale.resistance(body, particle, gap, two_sided);
+        let yielding = constraint.sides().fold(0.0, |sum, side| sum + side.1 * side.1 / stiff(side.0));
+        let of_heap = two_sided && constraint.sides().any(|side| scale.heaps.get(side.0) == Some(&true));
+        constraint.of_heap = of_heap;
         constraint.penalty_stiffness = PENALTY_RATIO / yielding;
-        constraint.stick_limit = STICK_RATIO * constraint.penalty_stiffness * seconds;
+        constraint.stick_limit = STICK_RATIO * constraint.penalty_stiffness * scale.seconds;
         (yielding > 0.0 && constraint.penalty_stiffness.is_finite()).then_some(constraint)
     }
 
@@ -253,7 +234,7 @@ impl ContactConstraint {
     /// Whether the contact is too deep to be accepted at `x`.
     pub(super) fn is_too_deep(&self, x: &[DVec3]) -> bool {
         let depth = self.depth(x, 0.0);
-        depth > 0.0 && self.gap_fraction(depth) > TOO_DEEP
+        !self.of_heap && depth > 0.0 && self.gap_fraction(depth) > TOO_DEEP
     }
 
     /// Whether the surfaces penetrate each other at the start `x` of a step of `seconds`: the force then separates
@@ -378,7 +359,7 @@ impl ContactConstraint {
         state
     }
 
-    /// The state before the first linear system, which expects the last load.
+    /// The state before the first linear system.
     pub(super) fn unsolved(&self) -> ContactState {
         ContactState { predicted: self.load, ..ContactState::default() }
     }

@@ -3,7 +3,9 @@
 //! Friction is solved with given normal loads: first those of the last step, then those found by the descent, until
 //! they agree (see [`super::friction`]). The result satisfies Coulomb's law for its own normal forces.
 
-use super::contact::{Contact, ContactConstraint, ContactQuery};
+use super::contact::{Contact, ContactConstraint};
+use super::finder::ContactQuery;
+use super::heap::ContactScale;
 use super::spacing;
 use super::springs::distance;
 use super::stage::{Solved, Stage};
@@ -24,9 +26,13 @@ impl Stepper<'_> {
         let mut found: Vec<Contact> = Vec::new();
         let [from, to] = [&start.x, to].map(|x| body.contact_points(x));
         contacts.find(&ContactQuery { from: &from, to: &to, times }, &mut found);
-        let known = found
-            .iter()
-            .filter_map(|contact| ContactConstraint::new(body, contact, self.seconds, &self.solver.particle_stiffness));
+        let scale = ContactScale {
+            seconds: self.seconds,
+            gravity: self.context.external.at(times[1]).gravity.norm(),
+            particle_stiffness: &self.solver.particle_stiffness,
+            heaps: &self.solver.heaps,
+        };
+        let known = found.iter().filter_map(|contact| ContactConstraint::new(body, contact, &scale));
         let known = known.map(|c| {
             let displacement = spacing::least(body, &c) * h / self.seconds;
             c.depenetrating(&start.x, h, displacement).with_load(&start.x, &start.loads, h)
@@ -89,6 +95,8 @@ impl Stepper<'_> {
                 break;
             }
             take_loads(contacts, &mut found);
+            found.retain(|contact| !contact.of_heap);
+            found.extend(contacts.iter().filter(|contact| contact.of_heap));
             *contacts = found;
         }
         let v: Vec<DVec3> = x.iter().zip(&z).map(|(x, z)| (x - z) / h).collect();

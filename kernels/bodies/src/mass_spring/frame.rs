@@ -1,14 +1,16 @@
 //! One frame of a body: input, report, and step size control.
 
 use super::body::SoftBody;
-use super::contact::ContactFinder;
 use super::energy::{Energies, measure, worst_stretch};
 use super::external::{Ambient, ExternalForces, GoalSpring, Pin};
+use super::finder::{ContactFinder, ContactQuery};
+use super::heap::heaps;
 use super::springs::{self, RestLengths};
 use super::stage::{FrameContext, StageSolver};
 use super::state::State;
 use super::step::{Kinematics, Stepped, Stepper};
 use super::volume::{Inventory, Volumes};
+use numerics::vector::DVec3;
 
 /// Largest number of steps in a frame, and of parts into which a step is cut at once.
 const MOST_STEPS: u32 = 256;
@@ -99,6 +101,8 @@ pub struct FrameReport {
     /// Steps with an impact that were not cut as short as its bounce needs, because the frame had taken too many Newton
     /// iterations.
     pub uncut_impacts: u32,
+    /// Steps in which an obstacle near a body turned farther than contacts can follow.
+    pub fast_turns: u32,
     /// Estimated error of positions that the frame added, metres: the sum over its steps of the largest error of a
     /// particle.
     pub error_estimate: f64,
@@ -173,6 +177,7 @@ impl BodySolver {
         self.solver.volumes = Volumes::new(body, frame.volume, &state.volumes);
         self.solver.system.regions.idle = self.solver.volumes.is_disabled();
         springs::particle_stiffness(body, &rest, &mut self.solver.particle_stiffness);
+        self.solver.heaps = heaps(body, external.at(1.0).gravity);
         self.solver.system.set_loose(&external.held, &self.solver.particle_stiffness);
         let context =
             FrameContext { body, external: &external, rest, volumes: &state.volumes, cancelled: frame.cancelled };
@@ -243,11 +248,18 @@ impl Stepper<'_> {
         /// Newton iterations of a frame after which steps are accepted, so that the frame ends; by default, and with a
         /// tolerance.
         const MOST_NEWTON: [u32; 2] = [400, 4000];
+        let share = times[1] - times[0];
+        let shortest = share * f64::from(MOST_STEPS) < 2.0;
+        let turns = self.least_steps(motion, times);
+        if turns > 1 && self.frame.substeps == 0 && !shortest {
+            return self.advance_in(turns.min((share * f64::from(MOST_STEPS)) as u32), motion, times, deepest);
+        }
+        self.report.fast_turns += u32::from(turns > 1);
         let turned = self.solver.inventory.inverted > 0;
         let (mut end, mut stepped) = self.step(motion, times);
         self.report.newton += stepped.solved.newton;
         self.report.cg += stepped.solved.cg;
-        let (share, unmet) = (times[1] - times[0], stepped.solved.unmet);
+        let unmet = stepped.solved.unmet;
         let allowed = self.tolerance.map_or(f64::INFINITY, |tolerance| tolerance * share);
         let (wanted, mut parts) = match self.tolerance {
             Some(_) => (1, accurate_parts(&stepped, allowed)),
@@ -257,7 +269,6 @@ impl Stepper<'_> {
         if (unmet > 0.0 || stepped.solved.failed) && !no_help {
             parts = parts.max(2);
         }
-        let shortest = share * f64::from(MOST_STEPS) < 2.0;
         let is_over = self.report.newton >= MOST_NEWTON[usize::from(self.tolerance.is_some())] || shortest;
         if self.frame.substeps > 0 || (self.frame.cancelled)() || is_over || parts < 2 {
             self.report.uncut_impacts += u32::from(wanted > 1 && !shortest);
@@ -272,6 +283,15 @@ impl Stepper<'_> {
         let parts = parts.min((share * f64::from(MOST_STEPS)) as u32).max(2);
         let deepest = if unmet > 0.0 { unmet } else { deepest };
         self.advance_in(parts, motion, times, deepest);
+    }
+
+    /// The number of parts that a step between `times` has to be cut into because of obstacles that turn.
+    fn least_steps(&self, start: &Kinematics, times: [f64; 2]) -> u32 {
+        let Some(contacts) = self.frame.contacts else { return 1 };
+        let h = (times[1] - times[0]) * self.seconds;
+        let ahead: Vec<DVec3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
+        let [from, to] = [&start.x, &ahead].map(|x| self.context.body.contact_points(x));
+        contacts.least_steps(&ContactQuery { from: &from, to: &to, times })
     }
 
     /// The number of parts that a step has to be cut into so that an impact keeps its bounce, and how many of them the

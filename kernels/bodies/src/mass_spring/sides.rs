@@ -1,5 +1,5 @@
-//! What is done where a step that may not be shortened any further leaves contacts with open obstacles too deep: what would
-//! otherwise go through them is kept on the side it came from.
+//! What is done where a step that may not be shortened any further leaves contacts with open obstacles or the ground too deep:
+//! what would otherwise go through them is kept on the side it came from.
 //!
 //! From positions alone the next step could not tell that side, as it can where an obstacle has an inside. Particles are
 //! therefore moved back until contacts are just not too deep, and no longer approach, as in an inelastic impact.
@@ -16,7 +16,7 @@ const ROUNDS: u32 = 4;
 const TURNS: u32 = 8;
 
 impl Stepper<'_> {
-    /// Changes the `end` of a step from `start` so that contacts with open obstacles that were not too deep at its start
+    /// Changes the `end` of a step from `start` so that contacts with open obstacles and the ground that were not too deep at its start
     /// are not at its end.
     pub(super) fn keep_sides(
         &mut self,

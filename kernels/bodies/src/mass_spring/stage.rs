@@ -146,6 +146,8 @@ pub(super) struct StageSolver {
     pub(super) offset_from_centroid: Vec<Vec3>,
     /// Springs of the current stage.
     pub(super) links: Vec<Link>,
+    /// Whether each particle is of a heap; empty if none is.
+    pub(super) heaps: Vec<bool>,
     /// Sum of spring stiffnesses at each particle, N/m.
     pub(super) particle_stiffness: Vec<f64>,
     /// The factored coarse matrix, that of the state during a frame.

@@ -284,3 +284,44 @@ fn a_stack_of_boxes_takes_hardly_more_iterations_than_one() {
         assert!(many[1] / many[0] < 4.0 * one[1] / one[0], "{one:?}, {two:?}, {three:?}");
     }
 }
+
+/// A cube of 8 cm beside a paddle of 60 cm that turns about its middle within one frame, known at quarters of it.
+#[test]
+fn a_paddle_that_turns_by_any_angle_in_a_frame_hits_what_is_in_its_way() {
+    let (paddle, triangles) = cuboid([0.6, 0.02, 0.4]);
+    let turned = |degrees: f64| -> Vec<[f64; 3]> {
+        let (sine, cosine) = libm::sincos(degrees.to_radians());
+        paddle.iter().map(|[x, y, z]| [cosine * x - sine * y, sine * x + cosine * y, *z]).collect()
+    };
+    let (sine, cosine) = libm::sincos(20.0_f64.to_radians());
+    let (points, tets, faces) = block([2; 3], 0.04, [0.2 * cosine - 0.04, 0.2 * sine - 0.04, -0.04]);
+    let body = body(&points, &tets, 2e4);
+    let skins = [BodySkin::new(&points, &faces, &body.springs()).unwrap()];
+    for degrees in [100.0, 140.0, 170.0, 200.0, 250.0, 400.0] {
+        for substeps in [0, 1] {
+            let poses: [ObstaclePose; 5] = std::array::from_fn(|k| {
+                let share = k as f64 / 4.0;
+                pose(share, &turned(degrees * share))
+            });
+            let obstacles = [Obstacle::new(&triangles, &poses, FRAME, THICKNESS, 0.5).unwrap()];
+            let scene = CollisionScene { skins: &skins, obstacles: &obstacles, ..CollisionScene::default() };
+            let frame = SolverFrame { contacts: Some(&scene), gravity: [0.0; 3], substeps, ..SolverFrame::default() };
+            let mut state = State::at_rest(&body);
+            let report = BodySolver::new(&body).step(&body, &mut state, &frame);
+            if substeps == 1 {
+                assert_eq!(report.fast_turns, 1, "{degrees} degrees");
+                continue;
+            }
+            let found = scene.penetration(&state.positions);
+            let what = format!("{degrees} degrees: {found:?} {report:?}");
+            println!("{what} {}", fastest(&state));
+            assert!(fastest(&state) > 2.0 && found.inside == 0 && report.fast_turns == 0, "{what}");
+        }
+    }
+    let far: Vec<[f64; 3]> = points.iter().map(|[x, y, z]| [x + 1.0, *y, *z]).collect();
+    let obstacles =
+        [Obstacle::new(&triangles, &[pose(0.0, &paddle), pose(1.0, &turned(170.0))], FRAME, THICKNESS, 0.5).unwrap()];
+    let scene = CollisionScene { skins: &skins, obstacles: &obstacles, ..CollisionScene::default() };
+    let steps = |x: &[[f64; 3]]| scene.least_steps(&ContactQuery { from: x, to: x, times: [0.0, 1.0] });
+    assert_eq!((steps(&points), steps(&far)), (3, 1), "one in its way takes steps of 60 degrees at most");
+}

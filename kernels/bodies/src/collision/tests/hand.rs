@@ -248,3 +248,31 @@ fn overstretched_skin_is_released() {
         assert_eq!(skin[0].released_edges(&x), if held { 0 } else { 2 });
     }
 }
+
+/// A strip of five quads along x and four along z, bent so that its first and last quads cross as an X of two flaps, the last
+/// 1.4 times as wide. Through the last go all nine edges along the first, diagonals included; through the first those three
+/// lines and two diagonals of the last that are within its width.
+#[test]
+fn edges_of_two_flaps_that_cross_are_counted() {
+    let flat: [[f64; 2]; 6] = std::array::from_fn(|k| [k as f64, 0.0]);
+    let bent = [[0.0, 0.0], [1.0, 1.0], [2.0, 1.0], [2.0, -1.0], [1.0, 0.0], [0.0, 1.0]];
+    let strip = |profile: [[f64; 2]; 6], wide: f64| -> Vec<[f64; 3]> {
+        let z = |row: usize, k: i32| {
+            let z = f64::from(k) / 4.0 - 0.5;
+            if row < 4 { z } else { wide * z + 0.01 }
+        };
+        (0..6).flat_map(|row| (0..5).map(move |k| [profile[row][0], profile[row][1], z(row, k)])).collect()
+    };
+    let quad = |first: u32| [[first, first + 5, first + 6], [first, first + 6, first + 1]];
+    let triangles: Vec<[u32; 3]> = (0..25).filter(|point| point % 5 < 4).flat_map(quad).collect();
+    let count = |rest: &[[f64; 3]], x: &[[f64; 3]]| {
+        let skins = [BodySkin::new(rest, &triangles, &[]).unwrap()];
+        CollisionScene { skins: &skins, ..CollisionScene::default() }.self_crossings(x)
+    };
+    let (flat, crossed) = (strip(flat, 1.4), strip(bent, 1.4));
+    assert_eq!(count(&flat, &crossed), 9 + 5);
+    assert_eq!(count(&flat, &flat), 0);
+    let apart = strip([[0.0, 0.0], [1.0, 1.0], [2.0, 1.0], [2.0, -1.0], [1.0, -1.0], [0.0, -1.0]], 1.4);
+    assert_eq!(count(&flat, &apart), 0);
+    assert_eq!(count(&crossed, &crossed), 0, "what crosses at rest does not count");
+}
