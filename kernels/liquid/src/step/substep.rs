@@ -116,10 +116,6 @@ impl<'a> Moving<'a> {
 /// would turn its cells over.
 pub(super) const STEEPEST: f32 = 0.25;
 
-/// The same of what is carried, ÷ the largest speed. What is continued becomes the liquid's where it comes to: with the nearest
-/// differences, which short substeps do not bound, thin sheets of splashes drove themselves to ten times their energy.
-const STEEPEST_CARRIED: f32 = 0.25;
-
 /// Layers past the liquid, besides the cells that it moves in a substep, in which velocity goes on as it changes: the faces of
 /// the next substep come from there. Farther out there may be films too thin for a cell, which would fly off.
 const SLOPING_LAYERS: u32 = 2;
@@ -257,7 +253,9 @@ fn continued(
         None => in_flight.is_some().then(|| own.clone()),
     };
     let nearest = Slopes::nearest(steepest);
-    let of_carried = Slopes { steepest: steepest.min(STEEPEST_CARRIED * way / step), smooth: true };
+    // What is carried becomes the liquid's where that comes to. With the nearest differences, which short substeps hardly limit,
+    // thin sheets of splashes drove themselves to ten times their energy.
+    let of_carried = Slopes { steepest, smooth: true };
     let layers = SLOPING_LAYERS + reach.ceil() as u32;
     let mut continued = Continued { velocity: MacVelocity::default(), carried: None, before: None, way, reach };
     let mean = in_flight.as_ref().unwrap_or(own);
