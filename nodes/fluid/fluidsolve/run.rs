@@ -239,6 +239,7 @@ impl Run {
             gravity: &|time| params(time)[0],
             viscosity: &|time| params(time)[1][0],
             solid: (!colliders.is_empty()).then_some(Solid { distance: &distance, velocity: &velocity }),
+            thin_speed: f64::from(colliders.thin_way()) * settings.cell / seconds,
             sources: &sources,
             sinks: &sinks,
             cancelled: &|| cx.check_cancelled().is_err(),
