@@ -27,7 +27,7 @@ const SURFACE: Output = Output::new("surface", &[Kind::Mesh], "The surface, clos
 
 pub(crate) static NODE: Node = Node::new(
     "Fluid_Surface",
-    1,
+    2,
     "Makes a mesh of the surface of a liquid: watertight, smooth where the liquid is, with normals, velocities and the \
      thickness of the liquid behind each point.",
     Cook::Pure(cook),

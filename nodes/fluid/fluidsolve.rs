@@ -107,10 +107,11 @@ params! { PARAMS:
          rate.");
     CFL: Param<f64> = Param::double("cfl", 2.0,
         "Maximum number of cells that liquid travels in a substep; the fastest 0.01 % of it may travel twice as many. \
-         Smaller values are more accurate and take longer.")
+         Smaller values are more accurate and take longer. Colliders thinner than three cells travel at most half a cell.")
         .above(0.0).soft(0.5, 5.0);
     MAX_SUBSTEPS: Param<i64> = Param::int("max_substeps", 32,
-        "Maximum number of substeps per frame. Where `cfl` asks for more, substeps are longer and less accurate.").within(1.0, 4096.0).soft(1.0, 64.0);
+        "Maximum number of substeps per frame. Where `cfl` or a fast thin collider asks for more, substeps are longer and less \
+         accurate.").within(1.0, 4096.0).soft(1.0, 64.0);
     TOLERANCE: Param<f64> = Param::double("tolerance", 1e-4,
         "Largest share of a cell's volume that a substep may gain or lose, and largest error of a velocity relative to what a \
          substep changes.")
@@ -157,10 +158,11 @@ metrics! { METRICS:
         .warn_above(64.0, "Liquid that moves more than 64 cells in a substep ends anywhere, and is lost. Look for a velocity, spin, \
             gravity or rate that is too high; or raise `max_substeps`, or `cell`.");
     CAPS_HIT = Metric::new("caps_hit", Unit::None,
-        "Substeps that were longer than `cfl` allows because of `max_substeps`, plus solves that stopped without \
+        "Substeps that were longer than `cfl` or a fast thin collider allow because of `max_substeps`, plus solves that stopped without \
             reaching `tolerance`. 0 is good.");
-    LONG_SUBSTEPS = Metric::new("long_substeps", Unit::None, "Substeps that were longer than `cfl` allows because of `max_substeps`.")
-        .warn_above(0.0, "Liquid moves {cfl_reached} cells in a substep, more than `cfl`. Raise `max_substeps`, or `cell`.");
+    LONG_SUBSTEPS = Metric::new("long_substeps", Unit::None, "Substeps that were longer than `cfl` or a fast thin collider allow because of `max_substeps`.")
+        .warn_above(0.0, "Liquid moves {cfl_reached} cells in a substep, more than `cfl`, or a collider thinner than three cells more than \
+            half a cell. Raise `max_substeps`, or `cell`.");
     SOLVES_CUT_SHORT = Metric::new("solves_cut_short", Unit::None, "Solves that stopped without reaching `tolerance`.")
         .warn_above(0.0, "Velocities are off by {coupled_residual} of the speed, net flows of cells by {pressure_residual}. Raise \
             `tolerance` or `cell`, or bring the viscosities of the liquids closer together.");

@@ -7,7 +7,7 @@ use liquid::shape::{MovingShape, ShapeSettings};
 use liquid::step::{Domain, LiquidSink, LiquidSource, SourceShape};
 
 use super::carried::MeshAttributes;
-use super::shapes::{check_size, in_cells, topology};
+use super::shapes::{cells_inside, check_size, in_cells, topology};
 use crate::shared::attributes::{
     SINK_ACTIVE, SINK_RATE, SOURCE_ACTIVE, SOURCE_DENSITY, SOURCE_RATE, SOURCE_VELOCITY, SOURCE_VISCOSITY,
 };
@@ -151,6 +151,14 @@ impl Opening {
     /// Whether its liquid is made of something else than the rest.
     pub(super) fn has_material(&self) -> bool {
         self.materials.iter().any(LiquidMaterial::is_own)
+    }
+
+    /// Cells that it keeps full in the end, about; 0 where it has a rate.
+    pub(super) fn kept_cells(&self, domain: &Domain, lattice: Lattice) -> f64 {
+        if self.has_rate() || !self.is_active(1.0) {
+            return 0.0;
+        }
+        cells_inside(&self.last, &in_cells(&self.last, lattice), [domain.low, domain.high])
     }
 
     /// The mesh at the end of the step, and where its attributes go.

@@ -21,7 +21,7 @@ use super::openings::{Opening, SINK, SOURCE, Timed};
 use super::particles::{particle_count, particles};
 use super::shapes::{Colliders, in_cells};
 use super::spray::{Air, SprayDrop, gathered, rejoining};
-use super::start::liquid_at_start;
+use super::start::{check_grown, liquid_at_start};
 use super::{
     CELL, CFL_REACHED, CLASHES, COLLECTING, DENSITY, EULER_CHARACTERISTIC, FAST_SHAPES, IN_COLLIDERS, IN_VAIN,
     INITIAL_SPIN, INITIAL_VELOCITY, LEFT_DOMAIN, LIQUID, LIQUID_CELLS, MADE_GOOD, MADE_GOOD_NOW, MATERIAL_DRIFT,
@@ -219,6 +219,10 @@ impl Run {
             let (mesh, attributes) = source.attributes();
             *attributes = self.columns.add_mesh(mesh, lattice, &mut self.surface);
         }
+        let is_split = self.motion.materials().is_some();
+        for source in &sources {
+            check_grown(cx, source.kept_cells(&settings.domain, lattice), is_split)?;
+        }
         let fast = sources.iter().chain(&sinks).filter(|opening| opening.is_fast()).count();
         self.note_rates(sources.iter().chain(&sinks));
         let has_material = sources.iter().any(Opening::has_material);
@@ -235,6 +239,7 @@ impl Run {
             gravity: &|time| params(time)[0],
             viscosity: &|time| params(time)[1][0],
             solid: (!colliders.is_empty()).then_some(Solid { distance: &distance, velocity: &velocity }),
+            thin_speed: f64::from(colliders.thin_way()) * settings.cell / seconds,
             sources: &sources,
             sinks: &sinks,
             cancelled: &|| cx.check_cancelled().is_err(),
@@ -245,6 +250,7 @@ impl Run {
         }
         let report = liquid.step_frame(&around, seconds);
         cx.check_cancelled()?;
+        check_grown(cx, report.liquid_cells as f64, liquid.motion().materials().is_some())?;
         let has_phases = liquid.motion().materials().is_some();
         let phase = |n: u32| if has_phases { self.start_phases + n } else { 0 };
         for (account, n) in liquid.sources().iter().zip(0..) {

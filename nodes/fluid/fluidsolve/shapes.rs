@@ -157,6 +157,11 @@ impl Colliders {
         self.0.iter().filter(|collider| collider.shape.is_capped()).count()
     }
 
+    /// Cells that the fastest of those that are thin moves in the step.
+    pub(super) fn thin_way(&self) -> f32 {
+        self.0.iter().fold(0.0, |most, collider| most.max(collider.shape.thin_way()))
+    }
+
     /// `distance`, where there are colliders.
     pub(super) fn solid<'a>(&self, distance: &'a Distance<'a>) -> Option<&'a Distance<'a>> {
         if self.is_empty() { None } else { Some(distance) }

@@ -206,8 +206,7 @@ pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Res
     let settings = ShapeSettings::new(low, high);
     let has_material = |mesh: &Component| mesh.get(SOURCE_VISCOSITY).is_some() || mesh.get(SOURCE_DENSITY).is_some();
     let is_split = cx.at_start(LIQUID).iter().filter_map(|geometry| geometry.mesh()).any(has_material);
-    let fine_cells = f64::from(by.pow(2));
-    let bytes = CELL_BYTES / fine_cells + if is_split { MATERIAL_BYTES / (fine_cells * f64::from(by)) } else { 0.0 };
+    let bytes = fine_cell_bytes(by, is_split);
     let (mut shapes, mut parts, mut found) = (Vec::new(), Vec::new(), Vec::new());
     for (wire, mesh) in cx.at_start(LIQUID).iter().filter_map(|geometry| geometry.mesh()).enumerate() {
         let what = format!("`liquid` {wire} (counted from 0)");
@@ -251,6 +250,23 @@ pub(super) fn liquid_at_start(cx: &Cx, domain: &Domain, lattice: Lattice) -> Res
         }
     });
     Ok(StartLiquid { surface, columns, by, meshes: shapes, found })
+}
+
+/// Bytes that a cell of the surface in the liquid takes while it moves, where there are `by` along the side of a solver cell;
+/// more where liquids are of several materials.
+fn fine_cell_bytes(by: u32, is_split: bool) -> f64 {
+    let faces = f64::from(by.pow(2));
+    CELL_BYTES / faces + if is_split { MATERIAL_BYTES / (faces * f64::from(by)) } else { 0.0 }
+}
+
+/// Refuses liquid that grows, to so many solver cells, beyond the memory that there is.
+///
+/// # Errors
+/// Where it takes more.
+pub(super) fn check_grown(cx: &Cx, liquid_cells: f64, is_split: bool) -> Result<()> {
+    let by = resolution(cx);
+    let cells = liquid_cells * f64::from(by.pow(3));
+    cx.reserve(cells * fine_cell_bytes(by, is_split), "use larger cells, a smaller box, or less from `sources`")
 }
 
 /// A distance that is not 0.

@@ -11,6 +11,9 @@ const STRIDE: f32 = 2.0;
 /// Intervals between poses in a frame: as many as make 64 cells, which a substep's liquid hardly moves either.
 const MOST_POSES: usize = 32;
 
+/// Depth, in cells, that no place of a thin solid has: its distance is then rounded off between its sides.
+const THIN: f32 = 1.5;
+
 /// A mesh at one time of a frame.
 #[derive(Clone, Debug)]
 struct Pose {
@@ -31,6 +34,8 @@ pub struct MovingShape {
     poses: Vec<Pose>,
     end: Vec<Vec3>,
     is_capped: bool,
+    /// Cells that its fastest point moves in the frame.
+    way: f32,
 }
 
 impl MovingShape {
@@ -82,7 +87,7 @@ impl MovingShape {
             Pose { shape, velocity }
         };
         let poses = std::iter::once(first).chain(later).map(pose).collect();
-        Self { settings: *settings, poses, end: end.to_vec(), is_capped: wanted > MOST_POSES as f32 }
+        Self { settings: *settings, poses, end: end.to_vec(), is_capped: wanted > MOST_POSES as f32, way: farthest }
     }
 
     /// Times of the frame at which the distance is computed: 1 where the mesh stands still.
@@ -93,6 +98,12 @@ impl MovingShape {
     /// Whether it moves farther in the frame than distances follow accurately: 64 cells.
     pub fn is_capped(&self) -> bool {
         self.is_capped
+    }
+
+    /// Cells that its fastest point moves in the frame, where it is thinner than three cells everywhere; else 0.
+    pub fn thin_way(&self) -> f32 {
+        let is_thin = |pose: &Pose| pose.shape.distance().iter().all(|distance| *distance > -THIN);
+        if self.way > 0.0 && self.poses.iter().all(is_thin) { self.way } else { 0.0 }
     }
 
     /// The shape at the start of the frame and at its end.

@@ -241,6 +241,9 @@ impl LiquidReport {
 const RARE: usize = 10_000;
 const FASTER: f64 = 2.0;
 
+/// Cells that a solid thinner than three moves in a substep, at most: one that moves farther leaves liquid on its other side.
+const THIN_WAY: f64 = 0.5;
+
 /// Share of a frame that a substep takes in which pouring begins or ends: it does so at the end of a substep.
 const BEGINNING: f64 = 1e-6;
 
@@ -354,7 +357,8 @@ impl<S: Surface> Liquid<S> {
     /// The next of at most `allowed` substeps between two times.
     fn plan(&self, around: &Surroundings<'_>, [from, to]: [f64; 2], allowed: u32) -> Plan {
         let (left, allowed) = (to - from, f64::from(allowed.max(1)));
-        let longest = self.longest_substep((around.gravity)(from));
+        let longest =
+            self.longest_substep((around.gravity)(from)).min(THIN_WAY * self.settings.cell / around.thin_speed);
         let wanted = (left / longest).ceil().max(1.0);
         let is_capped = wanted > allowed;
         let count = if is_capped { allowed } else { wanted };

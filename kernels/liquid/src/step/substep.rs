@@ -26,6 +26,8 @@ pub struct Surroundings<'a> {
     pub viscosity: &'a (dyn Fn(f64) -> f64 + Sync),
     /// What liquid does not enter.
     pub solid: Option<Solid<'a>>,
+    /// The speed of the fastest solid that is thinner than three cells, m/s: substeps are short enough to see it on its way.
+    pub thin_speed: f64,
     /// Where liquid comes in. Their order is that of their accounts: it stays from frame to frame.
     pub sources: &'a [LiquidSource<'a>],
     /// Where it is taken away; likewise.
@@ -40,7 +42,7 @@ impl<'a> Surroundings<'a> {
         gravity: &'a (dyn Fn(f64) -> [f64; 3] + Sync),
         viscosity: &'a (dyn Fn(f64) -> f64 + Sync),
     ) -> Self {
-        Self { gravity, viscosity, solid: None, sources: &[], sinks: &[], cancelled: &|| false }
+        Self { gravity, viscosity, solid: None, thin_speed: 0.0, sources: &[], sinks: &[], cancelled: &|| false }
     }
 }
 

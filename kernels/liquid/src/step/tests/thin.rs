@@ -105,3 +105,50 @@ fn a_tilted_cup_of_plates_does_not_leak() {
     let Rest { gone, .. } = rest([32, 26, 20], (points, triangles), |p| inside(own(p)), is_outside);
     assert!(gone < 1e-2, "{gone}");
 }
+
+/// A plate of this thickness sweeps a block of thick liquid along at a speed, cells a frame; the largest share of the
+/// liquid that is behind it after a frame.
+fn swept(thickness: f32, cells: f32) -> f64 {
+    let domain = Domain::closed([0; 3], [32, 16, 20]);
+    let settings = ShapeSettings { thicken: true, ..ShapeSettings::new(domain.low, domain.high) };
+    let shape = numerics::shapes::block([f64::from(thickness), 40.0, 40.0], [1; 3]);
+    let at = |x: f32| -> Vec<Vec3> {
+        shape.points.iter().map(|p| [p[0] as f32 + x, p[1] as f32 + 8.0, p[2] as f32 + 10.0]).collect()
+    };
+    let topology = ShapeTopology::new(&at(0.0), &shape.triangles());
+    let settings_of = LiquidSettings::new(domain, 0.05);
+    let mut surface = MarkedSurface::new(domain, 1, block([9.0, -9.0, 5.0], [19.0, 5.4, 15.0]), 0, 1);
+    let full = volume(&surface.view(), &domain);
+    let (mut motion, mut worst) = (Motion::default(), 0.0_f64);
+    for frame in 0..6 {
+        let start = 6.0 + cells * frame as f32;
+        let moving = MovingShape::new(&topology, &at(start), &at(start + cells), &settings);
+        let share = |time: f64| (24.0 * time) as f32;
+        let distance = |time: f64, p: Vec3| moving.distance(share(time), p);
+        let velocity = |time: f64, p: Vec3| moving.velocity(share(time), p).map(|u| u * 24.0 * 0.05);
+        let around = Surroundings {
+            viscosity: &|_| 100.0,
+            solid: Some(Solid { distance: &distance, velocity: &velocity }),
+            thin_speed: 24.0 * 0.05 * f64::from(moving.thin_way()),
+            ..FALLING
+        };
+        let mut liquid = Liquid::resume(settings_of.clone(), surface, motion);
+        liquid.step_frame(&around, 1.0 / 24.0);
+        (surface, motion) = liquid.into_parts();
+        let phi = surface.phi_outside(&|p| moving.distance(1.0, p));
+        let cells_behind = surface.view().rows.iter().zip(&phi).filter(|(cell, _)| {
+            domain.contains(*cell) && Site::Centre.of(*cell)[0] < start + cells - 0.5 * thickness - 0.5
+        });
+        let behind = cells_behind.fold(0.0, |sum, (_, phi)| sum + f64::from((0.5 - phi).clamp(0.0, 1.0)));
+        worst = worst.max(behind / full);
+    }
+    worst
+}
+
+#[test]
+fn a_thin_plate_leaves_no_liquid_behind() {
+    for (thickness, cells) in [(1.0, 1.2), (1.0, 1.6), (2.0, 2.0), (1.0, 3.0), (0.2, 3.0_f32)] {
+        let behind = swept(thickness, cells);
+        assert!(behind < 1e-3, "{thickness} {cells}: {behind}");
+    }
+}
