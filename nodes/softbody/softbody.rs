@@ -81,8 +81,8 @@ params! { PARAMS:
     STIFFNESS: Param<Maskable> = Param::maskable("stiffness", 5e3,
         "Resistance to stretching (Young's modulus): dough 1e3 to 1e4, gelatine 1e4, rubber 1e6. To carry its weight a \
          body needs about `density` × gravity × its height: at that stiffness it sags by a sixth, at a quarter of it to \
-         half its height; at a twentieth tets turn inside out, and below a thousandth it collapses into a flat heap and \
-         loses volume.")
+         half its height; at a twentieth tets turn inside out, and below a hundredth it collapses into a heap, whose \
+         skin may go through itself. More than 1e8 × `density` counts as that.")
         .unit(Unit::Pascal).at_least(0.0).soft(0.0, 1e6);
     DAMPING: Param<Maskable> = Param::maskable("damping", 0.01,
         "How quickly wobbling fades: the ratio of the springs' damping to their stiffness. With 0 bodies keep \
@@ -233,6 +233,11 @@ metrics! { METRICS:
          bodies have no weight, or neither collider nor ground to lie on.")
         .warn_outside(0.25, f64::INFINITY, "A body is too soft to carry its weight: it flattens where it lies. Raise \
             `stiffness`, or lower `density` or `gravity`.");
+    STIFFNESS_LIMITED = Metric::new("stiffness_limited", Unit::None,
+        "Particles with a `stiffness` of more than 1e8 × `density`, in Pa and kg/m³, which counts as that.")
+        .warn_above(0.0, "`stiffness` exceeds 1e8 × `density` (in Pa and kg/m³), so 1e8 × `density` is taken instead: stiffer for \
+            its weight than steel. Beyond that the arithmetic does not hold, and nothing would look different. Lower `stiffness`, \
+            or raise `density`.");
     CONTACTS = Metric::new("contacts", Unit::None, "Contacts in which surfaces press on each other.");
     DEEPEST_OVERLAP = Metric::new("deepest_overlap", Unit::Metres,
         "`thickness` minus the smallest distance between surfaces in the output (negative where one is inside another): \

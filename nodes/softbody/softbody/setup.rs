@@ -86,6 +86,11 @@ impl ParticleNumber {
         Ok(Self { value: cx.get(param).value, mask })
     }
 
+    /// That of a particle.
+    fn at(&self, particle: usize) -> f64 {
+        f64::from(self.value) * self.mask.as_ref().map_or(1.0, |mask| f64::from(mask[particle]))
+    }
+
     fn masked(&self) -> Masked<'_, f64> {
         Masked { value: f64::from(self.value), mask: self.mask.as_deref() }
     }
@@ -96,17 +101,38 @@ pub(super) struct MaterialFields {
     density: ParticleNumber,
     stiffness: ParticleNumber,
     damping: ParticleNumber,
+    /// The numbers without their masks, which do not change.
+    values: [f32; 3],
+    /// Number of particles that are not as stiff as asked for.
+    pub(super) limited: usize,
 }
+
+/// Largest stiffness ÷ density, m²/s²: sound travels at 10 km/s. Beyond that solves end in noise, whose elastic energy exceeds the
+/// energy of the motion by far, and beyond 1e17 doubles do not hold the inertia beside the stiffness.
+const STIFFEST: f64 = 1e8;
 
 impl MaterialFields {
     pub(super) fn at(cx: &Cx, inputs: &StartInputs) -> Result<Self> {
         let of = |param| ParticleNumber::of(cx, inputs, param);
-        Ok(Self { density: of(DENSITY)?, stiffness: of(STIFFNESS)?, damping: of(DAMPING)? })
+        let (density, mut stiffness, damping) = (of(DENSITY)?, of(STIFFNESS)?, of(DAMPING)?);
+        let values = [density.value, stiffness.value, damping.value];
+        let counts = inputs.bodies.iter().map(|body| body.require(Kind::Tets).map(Component::point_count));
+        let particles = counts.sum::<Result<usize>>()?;
+        let most = |particle: usize| (STIFFEST * density.at(particle)) as f32;
+        let asked = |particle: usize| stiffness.at(particle) as f32;
+        let is_limited = |particle: &usize| asked(*particle) > most(*particle) && most(*particle) > 0.0;
+        let limited = (0..particles).filter(is_limited).count();
+        if limited > 0 {
+            let held = |particle| if is_limited(&particle) { most(particle) } else { asked(particle) };
+            let mask = (0..particles).map(held).collect();
+            stiffness = ParticleNumber { value: 1.0, mask: Some(mask) };
+        }
+        Ok(Self { density, stiffness, damping, values, limited })
     }
 
     /// The numbers without their masks, which do not change.
     pub(super) fn values(&self) -> [f32; 3] {
-        [self.density.value, self.stiffness.value, self.damping.value]
+        self.values
     }
 
     pub(super) fn material(&self) -> Material<'_> {

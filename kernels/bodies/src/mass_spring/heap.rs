@@ -32,8 +32,8 @@ impl ContactScale<'_> {
     /// thrown apart.
     pub(super) fn resistance(&self, body: &SoftBody, particle: usize, gap: f64, two_sided: bool) -> f64 {
         let weight = if two_sided || gap <= 0.0 { 0.0 } else { BORNE * self.gravity / gap };
-        let inertia = (4.0 / (self.seconds * self.seconds)).max(weight);
-        inertia * body.mass[particle] + self.particle_stiffness[particle] / 3.0
+        let mass = body.mass[particle];
+        (4.0 * mass / (self.seconds * self.seconds)).max(weight * mass) + self.particle_stiffness[particle] / 3.0
     }
 }
 

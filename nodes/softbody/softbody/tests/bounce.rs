@@ -105,3 +105,28 @@ fn a_cube_that_hits_the_ground_obliquely_keeps_the_speed_that_short_steps_give()
         }
     }
 }
+
+/// Stiffer for its weight than doubles hold: it falls freely, and its springs never store more than a hundredth of the energy
+/// of the fall. The same bits with the largest stiffness that counts.
+#[test]
+fn a_stiffness_beyond_what_doubles_hold_is_limited_and_said() {
+    let fall = |stiffness: f32, density: f32| {
+        let cube = block([3; 3], [0.0, 0.2, 0.0], [0.1; 3]);
+        simulating(cube).set(GROUND, true).set(STIFFNESS, stiffness.into()).set(DENSITY, density.into()).frames(1..=24)
+    };
+    for density in [1e-6_f32, 1.0, 1e3] {
+        let frames = fall(1e12, density);
+        let energy = f64::from(density) * 1e-3 * G * 0.2;
+        for (number, frame) in frames.iter().enumerate() {
+            let [elastic, limited, substeps] =
+                ["elastic", "stiffness_limited", "substeps_used"].map(|name| frame.metrics[name]);
+            assert!(elastic < 0.01 * energy && limited == 64.0, "{density}, {number}: {elastic} of {energy} J");
+            let fallen = 0.5 * G * (number as f64 * H) * (number as f64 * H);
+            let height = frame.mesh().positions().iter().map(|p| f64::from(p[1])).fold(f64::INFINITY, f64::min);
+            assert!(number > 4 || substeps > 1.0 || (height - 0.2 + fallen).abs() < 1e-6, "{density}, {number}");
+        }
+        let same = fall((1e8 * f64::from(density)) as f32, density);
+        assert_eq!(same[23].metrics["stiffness_limited"], 0.0, "{density}");
+        assert_eq!(same[23].mesh().positions(), frames[23].mesh().positions(), "{density}");
+    }
+}

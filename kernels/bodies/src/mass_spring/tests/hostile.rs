@@ -269,8 +269,9 @@ fn a_cancelled_frame_ends_soon() {
     }
 }
 
-/// E ÷ (ρgh) from 2.5e-3 to 5e-16, E in Pa, density in kg/m³: above the ground at the end of every frame, in at most four
-/// rounds of 60 iterations, not thrown up, and soon almost still.
+/// E ÷ (ρgh) from 2.5e-3 to 5e-16, E in Pa, density in kg/m³: above the ground at the end of every frame, not thrown up, and
+/// soon almost still. A frame that has taken 400 iterations takes no shorter steps, and a step four rounds of 60 at most; on
+/// average frames take a sixth of that.
 #[test]
 fn what_is_crushed_by_its_weight_stays_on_the_ground_in_a_bounded_number_of_iterations() {
     let (points, tets) = cubes([4; 3], [0.0, 0.2, 0.0], [0.2; 3]);
@@ -287,15 +288,18 @@ fn what_is_crushed_by_its_weight_stays_on_the_ground_in_a_bounded_number_of_iter
         let scene = CollisionScene { skins: &skins, ground, self_contact, ..CollisionScene::default() };
         let frame = SolverFrame { contacts: Some(&scene), gravity: [0.0, -gravity, 0.0], ..SolverFrame::default() };
         let (mut state, mut solver) = (State::at_rest(&body), BodySolver::new(&body));
+        let mut newton = 0;
         for number in 0..24 {
             let report = solver.step(&body, &mut state, &frame);
+            newton += report.newton;
             let heights = state.positions.iter().map(|p| p[1]);
             let (low, high) = (heights.clone().fold(f64::INFINITY, f64::min), heights.fold(0.0, f64::max));
             let what = format!("E {stiffness}, {density}, g {gravity}, frame {number}: {low} to {high} m, {report:?}");
             assert!(low > 0.0 && high < 0.4, "{what}");
-            assert!(report.stopped == 0 && report.newton <= 240, "{what}");
+            assert!(report.stopped == 0 && report.newton <= 640, "{what}");
             let fall = density * 8e-3 * gravity * 0.2;
             assert!(number < 20 || report.kinetic < 0.02 * fall, "{what}");
         }
+        assert!(newton <= 24 * 100, "E {stiffness}, {density}, g {gravity}: {newton}");
     }
 }
