@@ -5,6 +5,7 @@ use crate::shape::{MovingShape, ShapeSettings, ShapeTopology};
 use crate::volumes::VolumeTargets;
 
 use super::*;
+use numerics::vector::sub;
 
 /// What 24 frames did to a liquid.
 struct Rest {
@@ -80,7 +81,7 @@ fn a_tilted_cup_of_plates_does_not_leak() {
     let about = [16.0, 12.0, 10.0];
     let turned = |p: Vec3| [about[0] + cos * p[0] - sin * p[1], about[1] + sin * p[0] + cos * p[1], about[2] + p[2]];
     let own = |p: Vec3| {
-        let [x, y, z] = [0, 1, 2].map(|axis| p[axis] - about[axis]);
+        let [x, y, z] = sub(p, about);
         [cos * x + sin * y, cos * y - sin * x, z]
     };
     // Floor and walls, one cell thick, that touch: their sizes and middles.
