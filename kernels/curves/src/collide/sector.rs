@@ -59,6 +59,9 @@ pub(super) type P2 = [f64; 2];
 /// Sine of the angle between the ends of a piece above which rounding does not decide on which side of each other they lie.
 const CLEARLY_APART: f64 = 1e-12;
 
+/// An interval of parameters that is empty.
+const NO_PART: [f64; 2] = [1.0, 0.0];
+
 impl Sector {
     /// The direction after a turn by `angle`.
     pub(super) fn direction(&self, angle: f64) -> DVec3 {
@@ -70,6 +73,7 @@ impl Sector {
     }
 
     /// What the triangle does to a turn to the direction `until`; may leave out where it stops no turn before that.
+    #[inline(always)]
     pub(super) fn obstruction(&self, until: P2, corners: &[DVec3; 3]) -> Obstruction {
         // A point at radius r that lies `back` beyond the ray at angle α is past α by asin(back/r) ≥ back/r.
         let over = |p: P2| until[0] * p[1] - until[1] * p[0] >= self.back;
@@ -194,23 +198,20 @@ impl Sector {
     #[inline(always)]
     fn within_reach(&self, [p, q]: [P2; 2], mut found: impl FnMut(P2, P2)) {
         let Some([from, to]) = inside_circle(p, q, self.reach) else { return };
-        let at = |t: f64| [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
-        let mut part = |from: f64, to: f64| {
+        let skipped = if self.inner > 0.0 { inside_circle(p, q, self.inner) } else { None };
+        let parts = match skipped {
+            Some([near, far]) => [
+                if near > from { [from, near.min(to)] } else { NO_PART },
+                if far < to { [far.max(from), to] } else { NO_PART },
+            ],
+            None => [[from, to], NO_PART],
+        };
+        // One call for both: a closure called from several places is not compiled for a kernel's path.
+        for [from, to] in parts {
             if from <= to {
+                let at = |t: f64| [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
                 found(at(from), at(to));
             }
-        };
-        let skipped = if self.inner > 0.0 { inside_circle(p, q, self.inner) } else { None };
-        match skipped {
-            Some([near, far]) => {
-                if near > from {
-                    part(from, near.min(to));
-                }
-                if far < to {
-                    part(far.max(from), to);
-                }
-            }
-            None => part(from, to),
         }
     }
 }
