@@ -107,7 +107,7 @@ params! { PARAMS:
          rate.");
     CFL: Param<f64> = Param::double("cfl", 2.0,
         "Maximum number of cells that liquid travels in a substep; the fastest 0.01 % of it may travel twice as many. \
-         Smaller values are more accurate and take longer. Colliders thinner than three cells travel at most half a cell.")
+         Smaller values are more accurate and take longer. Colliders thinner than two and a half cells travel at most half a cell.")
         .above(0.0).soft(0.5, 5.0);
     MAX_SUBSTEPS: Param<i64> = Param::int("max_substeps", 32,
         "Maximum number of substeps per frame. Where `cfl` or a fast thin collider asks for more, substeps are longer and less \
@@ -161,7 +161,7 @@ metrics! { METRICS:
         "Substeps that were longer than `cfl` or a fast thin collider allow because of `max_substeps`, plus solves that stopped without \
             reaching `tolerance`. 0 is good.");
     LONG_SUBSTEPS = Metric::new("long_substeps", Unit::None, "Substeps that were longer than `cfl` or a fast thin collider allow because of `max_substeps`.")
-        .warn_above(0.0, "Liquid moves {cfl_reached} cells in a substep, more than `cfl`, or a collider thinner than three cells more than \
+        .warn_above(0.0, "Liquid moves {cfl_reached} cells in a substep, more than `cfl`, or a collider thinner than two and a half cells more than \
             half a cell. Raise `max_substeps`, or `cell`.");
     SOLVES_CUT_SHORT = Metric::new("solves_cut_short", Unit::None, "Solves that stopped without reaching `tolerance`.")
         .warn_above(0.0, "Velocities are off by {coupled_residual} of the speed, net flows of cells by {pressure_residual}. Raise \

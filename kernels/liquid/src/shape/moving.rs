@@ -12,7 +12,7 @@ const STRIDE: f32 = 2.0;
 const MOST_POSES: usize = 32;
 
 /// Depth, in cells, that no place of a thin solid has: its distance is then rounded off between its sides.
-const THIN: f32 = 1.5;
+const THIN: f32 = 1.25;
 
 /// A mesh at one time of a frame.
 #[derive(Clone, Debug)]
@@ -100,7 +100,7 @@ impl MovingShape {
         self.is_capped
     }
 
-    /// Cells that its fastest point moves in the frame, where it is thinner than three cells everywhere; else 0.
+    /// Cells that its fastest point moves in the frame, where it is thinner than two and a half cells everywhere; else 0.
     pub fn thin_way(&self) -> f32 {
         let is_thin = |pose: &Pose| pose.shape.distance().iter().all(|distance| *distance > -THIN);
         if self.way > 0.0 && self.poses.iter().all(is_thin) { self.way } else { 0.0 }

@@ -219,7 +219,12 @@ impl<'a> Exchange<'a> {
         }
         let most = TAKEN * liquid.len() as f64 * self.cell_volume();
         account.withhold_beyond(if liquid.is_empty() { 0.0 } else { most.max(flow.gave).max(owed) });
-        let rate = account.rate_to_pour(&flow, 0.0, before).min(most / self.span.next_seconds);
+        let (wanted, fastest) = (account.rate_to_pour(&flow, 0.0, before), most / self.span.next_seconds);
+        if wanted > fastest {
+            // It would be counted as taken at the end of the frame.
+            account.withhold_beyond(most);
+        }
+        let rate = wanted.min(fastest);
         (rate > 0.0).then(|| Pour::new(Holder::Sink(n), liquid, -rate))
     }
 

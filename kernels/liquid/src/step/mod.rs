@@ -241,7 +241,7 @@ impl LiquidReport {
 const RARE: usize = 10_000;
 const FASTER: f64 = 2.0;
 
-/// Cells that a solid thinner than three moves in a substep, at most: one that moves farther leaves liquid on its other side.
+/// Cells that a solid thinner than two and a half moves in a substep, at most: one that moves farther leaves liquid on its other side.
 const THIN_WAY: f64 = 0.5;
 
 /// Share of a frame that a substep takes in which pouring begins or ends: it does so at the end of a substep.

@@ -26,7 +26,7 @@ pub struct Surroundings<'a> {
     pub viscosity: &'a (dyn Fn(f64) -> f64 + Sync),
     /// What liquid does not enter.
     pub solid: Option<Solid<'a>>,
-    /// The speed of the fastest solid that is thinner than three cells, m/s: substeps are short enough to see it on its way.
+    /// The speed of the fastest solid that is thinner than two and a half cells, m/s: substeps are short enough to see it on its way.
     pub thin_speed: f64,
     /// Where liquid comes in. Their order is that of their accounts: it stays from frame to frame.
     pub sources: &'a [LiquidSource<'a>],

@@ -140,6 +140,24 @@ fn a_sink_in_a_pool_takes_its_rate() {
     assert!((gained / -0.2 - 1.0).abs() < 0.01, "{gained}: {volumes:?}");
 }
 
+#[test]
+fn a_sink_takes_no_more_than_there_is() {
+    let mut liquid = pool(4.8);
+    // Cells whose middle is in the shape.
+    let shape_volume = 90.0 * 0.0625_f64.powi(3);
+    let distance = ball([8.0, 3.0, 8.0], 2.6);
+    let rate = |from: f64, to: f64| 1e6 * (to - from);
+    let sinks = [LiquidSink::new(shape(&distance), Some(&rate))];
+    let around = Surroundings { sinks: &sinks, ..FALLING };
+    for frame in 0..12 {
+        let report = liquid.step_frame(&around, FRAME);
+        let most = f64::from(report.substeps + 1) * shape_volume;
+        assert!(report.sunk > 0.0 && report.sunk < most, "{frame}: {most} {report:?}");
+        let withheld = liquid.sinks().iter().map(|account| account.withheld).sum::<f64>();
+        assert!((withheld + report.sunk - 1e6 * FRAME).abs() < 0.1, "{frame}: {withheld} {report:?}");
+    }
+}
+
 /// What comes out of liquid or vanishes in it does so from the first frame on, in which the level rises by as much.
 #[test]
 fn a_source_and_a_sink_in_a_pool_pass_their_rates_from_the_first_frame_on() {
