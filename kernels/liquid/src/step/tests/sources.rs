@@ -144,7 +144,7 @@ fn a_sink_in_a_pool_takes_its_rate() {
 fn a_sink_takes_no_more_than_there_is() {
     let mut liquid = pool(4.8);
     // Cells whose middle is in the shape.
-    let shape_volume = 90.0 * 0.0625_f64.powi(3);
+    let shape_volume = 90.0 * liquid.settings.cell_volume();
     let distance = ball([8.0, 3.0, 8.0], 2.6);
     let rate = |from: f64, to: f64| 1e6 * (to - from);
     let sinks = [LiquidSink::new(shape(&distance), Some(&rate))];
