@@ -161,8 +161,9 @@ metrics! { METRICS:
         "Substeps that were longer than `cfl` or a fast thin collider allow because of `max_substeps`, plus solves that stopped without \
             reaching `tolerance`. 0 is good.");
     LONG_SUBSTEPS = Metric::new("long_substeps", Unit::None, "Substeps that were longer than `cfl` or a fast thin collider allow because of `max_substeps`.")
-        .warn_above(0.0, "Liquid moves {cfl_reached} cells in a substep, more than `cfl`, or a collider thinner than two and a half cells more than \
-            half a cell. Raise `max_substeps`, or `cell`.");
+        .warn_above(0.0, "Substeps at these frames are too long: liquid moves up to {cfl_reached} cells in one, or, where that is within `cfl`, \
+            a collider thinner than two and a half cells moves more than half a cell and may leave liquid behind it. Raise \
+            `max_substeps`, or `cell`.");
     SOLVES_CUT_SHORT = Metric::new("solves_cut_short", Unit::None, "Solves that stopped without reaching `tolerance`.")
         .warn_above(0.0, "Velocities are off by {coupled_residual} of the speed, net flows of cells by {pressure_residual}. Raise \
             `tolerance` or `cell`, or bring the viscosities of the liquids closer together.");

@@ -35,16 +35,7 @@ fn energy_and_middle(liquid: &Liquid<MarkedSurface>, domain: &Domain, cell: f64)
         let at = view.rows.find(cell).filter(|_| domain.contains(cell));
         f64::from(at.map_or(0.0, |at| (0.5 - view.phi[at]).clamp(0.0, 1.0)))
     };
-    let mut motion_energy = 0.0;
-    for (at, cell) in motion.rows().iter().enumerate() {
-        for axis in 0..3 {
-            let mut below = cell;
-            below[axis] -= 1;
-            let u = f64::from(motion.velocity().faces()[axis][at]);
-            motion_energy += 0.25 * (share(cell) + share(below)) * u * u;
-        }
-    }
-    [9.81 * height + motion_energy, middle / mass]
+    [9.81 * height + kinetic_energy(motion, share), middle / mass]
 }
 
 /// With its volume kept, as the piece that sloshes: energy then shows what motion gains.

@@ -95,6 +95,20 @@ fn volume(view: &PhiView<'_>, domain: &Domain) -> f64 {
     view.rows.iter().enumerate().map(|cell| f64::from(share(cell))).sum()
 }
 
+/// Kinetic energy ÷ density · cell³, m²/s², where `share` of each cell is liquid.
+fn kinetic_energy(motion: &Motion, share: impl Fn([i32; 3]) -> f64) -> f64 {
+    let mut energy = 0.0;
+    for (at, cell) in motion.rows().iter().enumerate() {
+        for axis in 0..3 {
+            let mut below = cell;
+            below[axis] -= 1;
+            let u = f64::from(motion.velocity().faces()[axis][at]);
+            energy += 0.25 * (share(cell) + share(below)) * u * u;
+        }
+    }
+    energy
+}
+
 /// The largest speed on a face, m/s.
 fn largest(liquid: &Liquid<impl Surface>) -> f64 {
     liquid.motion().largest_speed()
