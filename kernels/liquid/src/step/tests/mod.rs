@@ -15,6 +15,7 @@ mod rest;
 mod runs;
 mod sources;
 mod spin;
+mod spreading;
 mod splash;
 mod tank;
 mod thin;
