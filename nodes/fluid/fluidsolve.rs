@@ -279,6 +279,11 @@ metrics! { METRICS:
         "Colliders, sources and sinks that move more than 64 cells in the frame.")
         .warn_above(0.0, "These colliders, sources or sinks move more than 64 cells in a frame, so that where they are in between \
             is inaccurate, and thin ones may let liquid through. Slow them down, or raise `cell`.");
+    PASSED_THROUGH = Metric::new("passed_through", Unit::CubicMetres,
+        "Volume that colliders passed over in the frame: it was before one that moves more than two cells in a substep, and was behind it \
+            afterwards.")
+        .warn_above(0.0, "Colliders passed through {passed_through} m³ of liquid at these frames, because they move too far in a substep. \
+            Raise `max_substeps` to the number of cells that they move in a frame, slow them down, or raise `cell`.");
     LEFT_DOMAIN = Metric::new("left_domain", Unit::CubicMetres, "Volume that left through open walls since the start.");
 }
 

@@ -41,6 +41,7 @@ mod fullness;
 mod motion;
 mod outflow;
 mod part;
+mod passed;
 mod pour;
 mod project;
 mod shape_cells;
@@ -206,6 +207,8 @@ pub struct LiquidReport {
     pub stored_cells: usize,
     /// What flowed out through open walls, m³.
     pub left_domain: f64,
+    /// What was before a solid that moves too far in a substep, and is behind it since, m³.
+    pub passed_through: f64,
     /// What sources gave, m³.
     pub sourced: f64,
     /// What sinks took, m³.
@@ -232,6 +235,7 @@ impl LiquidReport {
         self.liquid_cells = other.liquid_cells;
         self.stored_cells = self.stored_cells.max(other.stored_cells);
         self.left_domain += other.left_domain;
+        self.passed_through += other.passed_through;
         self.sourced += other.sourced;
         self.sunk += other.sunk;
         (0..3).for_each(|axis| self.solid_force[axis] += other.solid_force[axis]);

@@ -10,6 +10,7 @@ use crate::step::first::begin;
 use crate::step::flight::Flight;
 use crate::step::motion::{Gain, LiquidCells, Motion, largest_of};
 use crate::step::outflow::outflow;
+use crate::step::passed::passed_over;
 use crate::step::project::{Materials, Projection};
 use crate::step::sources::{LiquidSink, LiquidSource, Span};
 use crate::step::turned;
@@ -110,12 +111,12 @@ impl<'a> Moving<'a> {
         let held = held(&|point| solid.distance(point), add(from, half), sub(way, moved))?;
         Some(Held { way: add(held.way, moved), ..held })
     }
-}
 
     /// Cells that the solid's surface moves, at most.
     pub(crate) fn solid_way(&self) -> f32 {
         self.solid.map_or(0.0, |solid| solid.speed() * self.step)
     }
+}
 
 /// Differences of velocity between neighbouring faces that are continued, in cells a substep: a flow that changes faster
 /// would turn its cells over.
@@ -167,6 +168,8 @@ pub(super) fn substep(
     if let Some(solid) = solid {
         surface.meet(&|point| solid.distance(point));
     }
+    let passed =
+        around.solid.map_or(0.0, |solid| passed_over(&surface.view(), motion, &settings.domain, &flow, (solid, times)));
     let mut exchanged = Exchange { settings, around, solid, span }.apply(surface, motion);
 
     let mut cells = LiquidCells::of(&settings.domain, surface, solid);
@@ -204,6 +207,7 @@ pub(super) fn substep(
     report.stored_cells = stored_cells;
     report.liquid_cells = cells.liquid.len();
     report.left_domain = left_domain;
+    report.passed_through = passed * settings.cell_volume();
     motion.gain = (settings.splitting == Splitting::KeepsSpin).then(|| {
         let gained =
             |axis: usize| faces[axis].iter().zip(&before[axis]).map(|(after, before)| after - before).collect();
