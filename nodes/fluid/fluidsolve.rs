@@ -107,10 +107,10 @@ params! { PARAMS:
          rate.");
     CFL: Param<f64> = Param::double("cfl", 2.0,
         "Maximum number of cells that liquid travels in a substep; the fastest 0.01 % of it may travel twice as many. \
-         Smaller values are more accurate and take longer. Colliders thinner than two and a half cells travel at most half a cell.")
+         Smaller values are more accurate and take longer. The surfaces of colliders travel at most one cell.")
         .above(0.0).soft(0.5, 5.0);
     MAX_SUBSTEPS: Param<i64> = Param::int("max_substeps", 32,
-        "Maximum number of substeps per frame. Where `cfl` or a fast thin collider asks for more, substeps are longer and less \
+        "Maximum number of substeps per frame. Where `cfl` or a fast collider asks for more, substeps are longer and less \
          accurate.").within(1.0, 4096.0).soft(1.0, 64.0);
     TOLERANCE: Param<f64> = Param::double("tolerance", 1e-4,
         "Largest share of a cell's volume that a substep may gain or lose, and largest error of a velocity relative to what a \
@@ -158,11 +158,11 @@ metrics! { METRICS:
         .warn_above(64.0, "Liquid that moves more than 64 cells in a substep ends anywhere, and is lost. Look for a velocity, spin, \
             gravity or rate that is too high; or raise `max_substeps`, or `cell`.");
     CAPS_HIT = Metric::new("caps_hit", Unit::None,
-        "Substeps that were longer than `cfl` or a fast thin collider allow because of `max_substeps`, plus solves that stopped without \
+        "Substeps that were longer than `cfl` or a fast collider allow because of `max_substeps`, plus solves that stopped without \
             reaching `tolerance`. 0 is good.");
-    LONG_SUBSTEPS = Metric::new("long_substeps", Unit::None, "Substeps that were longer than `cfl` or a fast thin collider allow because of `max_substeps`.")
+    LONG_SUBSTEPS = Metric::new("long_substeps", Unit::None, "Substeps that were longer than `cfl` or a fast collider allow because of `max_substeps`.")
         .warn_above(0.0, "Substeps at these frames are too long: liquid moves up to {cfl_reached} cells in one, or, where that is within `cfl`, \
-            a collider thinner than two and a half cells moves more than half a cell and may leave liquid behind it. Raise \
+            the surface of a collider moves more than one cell and takes away liquid before it can move on. Raise \
             `max_substeps`, or `cell`.");
     SOLVES_CUT_SHORT = Metric::new("solves_cut_short", Unit::None, "Solves that stopped without reaching `tolerance`.")
         .warn_above(0.0, "Velocities are off by {coupled_residual} of the speed, net flows of cells by {pressure_residual}. Raise \
@@ -279,12 +279,17 @@ metrics! { METRICS:
         "Colliders, sources and sinks that move more than 64 cells in the frame.")
         .warn_above(0.0, "These colliders, sources or sinks move more than 64 cells in a frame, so that where they are in between \
             is inaccurate, and thin ones may let liquid through. Slow them down, or raise `cell`.");
+    PASSED_THROUGH = Metric::new("passed_through", Unit::CubicMetres,
+        "Volume that colliders passed over in the frame: it was before one that moves more than two cells in a substep, and was behind it \
+            afterwards.")
+        .warn_above(0.0, "Colliders passed through {passed_through} m³ of liquid at these frames, because they move too far in a substep. \
+            Raise `max_substeps` to the number of cells that they move in a frame, slow them down, or raise `cell`.");
     LEFT_DOMAIN = Metric::new("left_domain", Unit::CubicMetres, "Volume that left through open walls since the start.");
 }
 
 pub(crate) static NODE: Node = Node::new(
     "FluidSolve",
-    10,
+    11,
     "Simulates a liquid, from water to honey to nearly rigid. It falls, splashes, sloshes, piles up and creeps. `viscosity` has \
      the same effect at any cell size and time step.",
     Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),

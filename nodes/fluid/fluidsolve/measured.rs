@@ -7,8 +7,8 @@ use liquid::step::{LiquidReport, Surface};
 
 use super::{
     CAPS_HIT, CFL_REACHED, COLLIDER_FORCE_X, COLLIDER_FORCE_Y, COLLIDER_FORCE_Z, COUPLED_ITERATIONS, COUPLED_RESIDUAL,
-    LIQUID_CELLS, LONG_SUBSTEPS, MAX_DIVERGENCE, PRESSURE_ITERATIONS, PRESSURE_RESIDUAL, SOLVES_CUT_SHORT,
-    SUBSTEPS_USED, VISCOSITY_ITERATIONS, VISCOSITY_RESIDUAL,
+    LIQUID_CELLS, LONG_SUBSTEPS, MAX_DIVERGENCE, PASSED_THROUGH, PRESSURE_ITERATIONS, PRESSURE_RESIDUAL,
+    SOLVES_CUT_SHORT, SUBSTEPS_USED, VISCOSITY_ITERATIONS, VISCOSITY_RESIDUAL,
 };
 
 /// Sets the metrics of a frame that the solver alone determines.
@@ -25,6 +25,7 @@ pub(super) fn measured(metrics: &mut MetricValues, report: &LiquidReport) {
     metrics.set(VISCOSITY_ITERATIONS, report.viscosity_iterations);
     metrics.set(VISCOSITY_RESIDUAL, report.viscosity_residual);
     metrics.set(MAX_DIVERGENCE, report.max_divergence.max(report.unbalanced));
+    metrics.set(PASSED_THROUGH, report.passed_through);
     metrics.set(LIQUID_CELLS, report.liquid_cells as f64);
     for (metric, force) in [COLLIDER_FORCE_X, COLLIDER_FORCE_Y, COLLIDER_FORCE_Z].into_iter().zip(report.solid_force) {
         metrics.set(metric, force);

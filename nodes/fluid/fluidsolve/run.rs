@@ -231,6 +231,7 @@ impl Run {
         let params = |time: f64| cx.integrands::<2>(first + frames * share(time));
         let distance = |time: f64, point: [f32; 3]| colliders.distance(share(time) as f32, point);
         let speed = (lattice.cell / seconds) as f32;
+        let solid_speed = colliders.sweep_near(self.surface.view().rows.bounds()) * lattice.cell / seconds;
         let velocity = |time: f64, point: [f32; 3]| colliders.velocity(share(time) as f32, point).map(|u| u * speed);
         let [sources, sinks] = [&sources, &sinks].map(|openings| Timed::all(openings, seconds));
         let sources: Vec<LiquidSource> = sources.iter().map(Timed::source).collect();
@@ -238,8 +239,11 @@ impl Run {
         let around = Surroundings {
             gravity: &|time| params(time)[0],
             viscosity: &|time| params(time)[1][0],
-            solid: (!colliders.is_empty()).then_some(Solid { distance: &distance, velocity: &velocity }),
-            thin_speed: f64::from(colliders.thin_way()) * settings.cell / seconds,
+            solid: (!colliders.is_empty()).then_some(Solid {
+                distance: &distance,
+                velocity: &velocity,
+                speed: solid_speed,
+            }),
             sources: &sources,
             sinks: &sinks,
             cancelled: &|| cx.check_cancelled().is_err(),

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use engine::prelude::*;
 use liquid::level_set::Distance;
+use liquid::rows::Cell;
 use liquid::shape::{MovingShape, ShapeSettings, ShapeTopology};
 use liquid::step::Domain;
 
@@ -157,9 +158,11 @@ impl Colliders {
         self.0.iter().filter(|collider| collider.shape.is_capped()).count()
     }
 
-    /// Cells that the fastest of those that are thin moves in the step.
-    pub(super) fn thin_way(&self) -> f32 {
-        self.0.iter().fold(0.0, |most, collider| most.max(collider.shape.thin_way()))
+    /// Cells that the surface of the fastest of those that come near these cells moves along its normal in the step.
+    pub(super) fn sweep_near(&self, cells: Option<(Cell, Cell)>) -> f64 {
+        let Some((low, high)) = cells else { return 0.0 };
+        let sweeps = self.0.iter().map(|collider| collider.shape.sweep_near([low, high]));
+        f64::from(sweeps.fold(0.0, f32::max))
     }
 
     /// `distance`, where there are colliders.

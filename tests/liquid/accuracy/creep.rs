@@ -81,7 +81,7 @@ fn couette() -> f64 {
         LiquidSettings { tolerance: 1e-7, ..LiquidSettings::new(domain([4, n, 2], [REPEATS, SHUT, REPEATS]), 0.1) };
     let mut liquid = at_rest(settings, |_| -9.0);
     let distance = |_: f64, p: Vec3| top as f32 - p[1];
-    let solid = Solid { distance: &distance, velocity: &|_, _| [0.5, 0.0, 0.0] };
+    let solid = Solid { distance: &distance, velocity: &|_, _| [0.5, 0.0, 0.0], speed: 0.0 };
     let around = Surroundings { solid: Some(solid), ..Surroundings::new(&|_| [0.0; 3], &|_| 1e5) };
     frames(&mut liquid, &around, 4, FRAME);
     let (found, exact): (Vec<_>, Vec<_>) =

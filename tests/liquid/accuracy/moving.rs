@@ -121,7 +121,7 @@ fn cavity(grids: &[(i32, f64)]) -> [f64; 3] {
         let settings = LiquidSettings::new(domain([n, n + 2, 1], [SHUT, SHUT, REPEATS]), cell);
         let mut liquid = at_rest(settings, |_| -9.0);
         let lid = |_: f64, p: Vec3| n as f32 - p[1];
-        let solid = Solid { distance: &lid, velocity: &|_, _| [1.0, 0.0, 0.0] };
+        let solid = Solid { distance: &lid, velocity: &|_, _| [1.0, 0.0, 0.0], speed: 0.0 };
         let around = Surroundings { solid: Some(solid), ..Surroundings::new(&|_| [0.0; 3], &|_| 10.0) };
         if let Some((coarse, velocity)) = &ended {
             let size = *coarse as f32 / n as f32;

@@ -55,6 +55,9 @@ const SKIN: f32 = 0.25;
 /// liquid that rolls over it would never leave: drops that spread lost 4 % of their volume to it.
 const LAG: f32 = 0.25;
 
+/// Cells that a solid moves from which on it may leave behind what was the half of it that liquid is continued into.
+const PASSING: f32 = 0.5;
+
 /// Height above a thin solid up to which a cell may be next to one that goes on from the other side.
 const NEXT_TO: f32 = 0.4;
 
@@ -80,6 +83,11 @@ pub trait Flow: Sync {
     /// −1 instead of 1.
     fn held(&self, _from: Vec3, _way: Vec3, _direction: f32) -> Option<Held> {
         None
+    }
+
+    /// Cells that the surfaces of solids move, at most.
+    fn solid_way(&self) -> f32 {
+        0.0
     }
 }
 
@@ -183,6 +191,10 @@ impl LevelSet {
         let high = [0, 1, 2].map(|axis| self.high[axis] + above[axis]);
         let before = PhiView { rows: &rows, phi: &phi, outside: BAND, low, high };
         let far = far_from_surface(reach);
+        // What is behind a thin solid does not come through it, whether liquid moves or the solid does.
+        let solid_way = flow.solid_way();
+        let may_be_passed = solid_way > PASSING;
+        let far = if may_be_passed { far.max(far_from_surface(solid_way)) } else { far };
         let mut phi = std::mem::take(&mut self.phi);
         self.stencil.update([&mut phi], |runs, first, [phi]| {
             let (mut way, mut way_at, mut sampler) = (flow.reader(), flow.centre_reader(), PhiSampler::new(before));
@@ -194,7 +206,8 @@ impl LevelSet {
                     let is_near_open = has_open && self.is_near_open(cell);
                     if value.abs() < far || is_near_open {
                         let (at, way_here) = (cell.map(|x| x as f32 + 0.5), way_at(cell));
-                        if value.abs() > far_from_surface(length(way_here)) && !is_near_open {
+                        let moved = length(way_here).max(solid_way);
+                        if value.abs() > far_from_surface(moved) && !is_near_open {
                             continue;
                         }
                         let middle = sub(at, scale(way_here, 0.5));
@@ -203,8 +216,8 @@ impl LevelSet {
                         if is_near_open {
                             carried = carried.max(self.air_from(at, back));
                         }
-                        let is_reached = *value > 0.0 && carried <= 0.0;
-                        // What is behind a thin solid does not come through it; φ above it is of this side.
+                        let is_reached = carried <= 0.0 && (*value > 0.0 || may_be_passed);
+                        // φ above it is of this side.
                         *value = match if is_reached { flow.held(at, back, -1.0) } else { None } {
                             Some(held) => sampler.at(add(add(at, held.way), scale(held.normal, ABOVE_THIN[0]))),
                             None => carried,

@@ -172,7 +172,7 @@ impl MarkedSurface {
                 if share > 0.0 && height < 0.0 {
                     let is_other_side = if is_thin { phi >= rise * height } else { rise > STEEP };
                     // In a corner no side is as close as the distance says.
-                    let is_corner = || distance(add(at, scale(normal, CLEAR - height))) < 0.0;
+                    let is_corner = || distance(add(at, scale(normal, CLEAR - height))) < 0.5 * CLEAR;
                     share = if is_other_side || is_corner() { 0.0 } else { share };
                 }
                 let wanted = share * (FILM - thickness);
@@ -361,6 +361,10 @@ impl Flow for Scaled<'_> {
         let unit = 1.0 / self.size;
         let held = self.flow.held(scale(from, unit), scale(way, unit), direction)?;
         Some(Held { way: scale(held.way, self.size), ..held })
+    }
+
+    fn solid_way(&self) -> f32 {
+        self.flow.solid_way() * self.size
     }
 }
 

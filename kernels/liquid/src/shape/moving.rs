@@ -1,18 +1,16 @@
 //! A mesh that moves within a frame.
 
 use numerics::parallel;
-use numerics::vector::{Vec3, add, length, lerp, scale, sub};
+use numerics::vector::{Vec3, add, cross, dot, length, lerp, scale, sub, unit};
 
 use super::{MeshShape, ShapeSettings, ShapeTopology, SurfacePlace, for_corners};
+use crate::rows::Cell;
 
 /// Cells that the fastest point moves from one pose to the next, at most, unless there are [`MOST_POSES`].
 const STRIDE: f32 = 2.0;
 
 /// Intervals between poses in a frame: as many as make 64 cells, which a substep's liquid hardly moves either.
 const MOST_POSES: usize = 32;
-
-/// Depth, in cells, that no place of a thin solid has: its distance is then rounded off between its sides.
-const THIN: f32 = 1.25;
 
 /// A mesh at one time of a frame.
 #[derive(Clone, Debug)]
@@ -34,8 +32,8 @@ pub struct MovingShape {
     poses: Vec<Pose>,
     end: Vec<Vec3>,
     is_capped: bool,
-    /// Cells that its fastest point moves in the frame.
-    way: f32,
+    /// Cells that its surface moves along its normal in the frame, at most.
+    sweep: f32,
 }
 
 impl MovingShape {
@@ -87,7 +85,8 @@ impl MovingShape {
             Pose { shape, velocity }
         };
         let poses = std::iter::once(first).chain(later).map(pose).collect();
-        Self { settings: *settings, poses, end: end.to_vec(), is_capped: wanted > MOST_POSES as f32, way: farthest }
+        let sweep = if farthest > 0.0 { sweep(&corners, [start, end], &velocities) } else { 0.0 };
+        Self { settings: *settings, poses, end: end.to_vec(), is_capped: wanted > MOST_POSES as f32, sweep }
     }
 
     /// Times of the frame at which the distance is computed: 1 where the mesh stands still.
@@ -100,10 +99,15 @@ impl MovingShape {
         self.is_capped
     }
 
-    /// Cells that its fastest point moves in the frame, where it is thinner than two and a half cells everywhere; else 0.
-    pub fn thin_way(&self) -> f32 {
-        let is_thin = |pose: &Pose| pose.shape.distance().iter().all(|distance| *distance > -THIN);
-        if self.way > 0.0 && self.poses.iter().all(is_thin) { self.way } else { 0.0 }
+    /// Cells that its surface moves along its normal in the frame, at most: 0 where it only slides along itself, or never comes
+    /// within the band of the cells `low` ≤ cell < `high`.
+    pub fn sweep_near(&self, [low, high]: [Cell; 2]) -> f32 {
+        let is_near = |pose: &Pose| {
+            let meets =
+                |(first, end): (Cell, Cell)| (0..3).all(|axis| first[axis] < high[axis] && end[axis] > low[axis]);
+            pose.shape.rows().bounds().is_some_and(meets)
+        };
+        if self.sweep > 0.0 && self.poses.iter().any(is_near) { self.sweep } else { 0.0 }
     }
 
     /// The shape at the start of the frame and at its end.
@@ -137,6 +141,20 @@ impl MovingShape {
         let since = |pose: usize| (at - pose as f32) / intervals.max(1) as f32;
         ((&self.poses[first], since(first)), (&self.poses[next], since(next)), at - first as f32)
     }
+}
+
+/// The most that a corner of a triangle moves along the triangle's normal, at the start or at the end. What is not finite does
+/// not count.
+fn sweep(triangles: &[[u32; 3]], poses: [&[Vec3]; 2], velocities: &[Vec3]) -> f32 {
+    let along = |points: &[Vec3], corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|corner| points[corner as usize]);
+        let Some(normal) = unit(cross(sub(b, a), sub(c, a))) else { return 0.0 };
+        let ways = corners.iter().map(|corner| dot(normal, velocities[*corner as usize]).abs());
+        ways.filter(|way| way.is_finite()).fold(0.0, f32::max)
+    };
+    let most = |points: &[Vec3]| triangles.iter().fold(0.0, |most: f32, corners| most.max(along(points, corners)));
+    let [start, end] = poses.map(most);
+    start.max(end)
 }
 
 impl Pose {

@@ -287,6 +287,23 @@ fn a_mesh_that_turns_has_the_velocity_of_its_closest_place() {
 }
 
 #[test]
+fn a_sweep_is_the_way_along_the_normal() {
+    let moved = |mesh: &Mesh, way: Vec3| {
+        let end: Vec<Vec3> = mesh.points.iter().map(|p| add(*p, way)).collect();
+        MovingShape::new(&mesh.topology(), &mesh.points, &end, &collider(24))
+    };
+    let near = [[0; 3], [24; 3]];
+    let sheet = Mesh::at(&grid([60.0; 2], 5), [12.0, 6.4, 12.0]);
+    assert!(moved(&sheet, [7.0, 0.0, 3.0]).sweep_near(near) < 1e-5);
+    assert!((moved(&sheet, [7.0, 2.0, 3.0]).sweep_near(near) - 2.0).abs() < 1e-5);
+    let ball = moved(&Mesh::at(&icosphere(3.0, 3), [6.0; 3]), [9.0, 0.0, 0.0]);
+    assert!((0.97..=1.0).contains(&(ball.sweep_near(near) / 9.0)));
+    // Where it never comes near the cells it does not count.
+    assert_eq!(ball.sweep_near([[4, 18, 4], [20, 24, 20]]), 0.0);
+    assert_eq!(moved(&sheet, [0.0; 3]).sweep_near(near), 0.0);
+}
+
+#[test]
 fn a_thin_plate_stays_closed_while_it_moves() {
     let plate = Mesh::at(&block([60.0, 0.1, 60.0], [3, 1, 3]), [12.0, 6.4, 12.0]);
     let end: Vec<Vec3> = plate.points.iter().map(|p| add(*p, [0.0, 11.0, 0.0])).collect();

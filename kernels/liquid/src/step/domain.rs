@@ -48,12 +48,14 @@ pub struct Solid<'a> {
     pub distance: &'a (dyn Fn(f64, Vec3) -> f32 + Sync),
     /// How it moves, m/s.
     pub velocity: &'a (dyn Fn(f64, Vec3) -> Vec3 + Sync),
+    /// How fast its surface moves along its normal, at most, m/s: substeps are short enough to see it on its way.
+    pub speed: f64,
 }
 
 impl<'a> Solid<'a> {
     /// A solid that does not move.
     pub fn still(distance: &'a (dyn Fn(f64, Vec3) -> f32 + Sync)) -> Self {
-        Self { distance, velocity: &|_, _| [0.0; 3] }
+        Self { distance, velocity: &|_, _| [0.0; 3], speed: 0.0 }
     }
 
     /// The solid at one time.
@@ -81,6 +83,11 @@ impl Obstacle<'_> {
 
     pub(super) fn velocity(&self, point: Vec3) -> Vec3 {
         (self.solid.velocity)(self.time, point)
+    }
+
+    /// How fast it moves, at most, m/s.
+    pub(super) fn speed(&self) -> f32 {
+        self.solid.speed as f32
     }
 
     /// The unit vector out of it.

@@ -33,6 +33,9 @@ const NEW: f32 = 0.1;
 /// same, and what little is missing of it is filled in each substep.
 const LEAST_STREAM: f64 = 0.8;
 
+/// Share by which the velocity of a nozzle is raised where its shape is too narrow for its rate, at most.
+const FASTER: f64 = 0.1;
+
 /// What a source or a sink asks for between two times.
 type Rate<'a> = Option<&'a (dyn Fn(f64, f64) -> f64 + Sync)>;
 
@@ -118,7 +121,8 @@ impl<'a> Exchange<'a> {
         let Some(cells) = self.cells(source.shape) else { return account.withhold_beyond(0.0) };
         let mut phi = cells.level_set(&surface.view());
         let material = (source.material)(self.span.times[1]);
-        let velocity = self.imposed(source, &cells, &phi, flow.gave);
+        let late = if before > 0.0 { 0.0 } else { account.owed - flow.gave };
+        let velocity = self.imposed(source, &cells, &phi, &flow, late);
         let part = match source.rate {
             None => Some(Part::Whole),
             Some(_) if is_given => self.part(&cells, &phi, account.owed, EARLY * flow.next * flow.next_seconds),
@@ -172,10 +176,21 @@ impl<'a> Exchange<'a> {
         }
     }
 
-    /// The velocity that a source imposes, given what its rate gave in the substep, m³: where that would leave less than the
-    /// least piece of its shape that stays liquid, a lower one.
-    fn imposed(&self, source: &LiquidSource<'_>, cells: &ShapeCells<'_>, phi: &[f32], gave: f64) -> Option<Vec3> {
+    /// The velocity that a source imposes: where what its rate gives would leave less than the least piece of its shape that stays
+    /// liquid, a lower one; where its shape is a little too narrow on the grid to let through what the rate gives, so that it is
+    /// `late` by this volume, m³, one a little higher.
+    fn imposed(
+        &self,
+        source: &LiquidSource<'_>,
+        cells: &ShapeCells<'_>,
+        phi: &[f32],
+        flow: &Flow,
+        late: f64,
+    ) -> Option<Vec3> {
+        let (gave, next) = (flow.gave, flow.next * flow.next_seconds);
         let velocity = (source.velocity?)(self.span.times[1]);
+        let faster = if late > 0.0 && next > 0.0 { (late / next).min(FASTER) } else { 0.0 };
+        let velocity = scale(velocity, 1.0 + faster as f32);
         let speed = f64::from(length(velocity));
         if gave <= 0.0 || speed <= 0.0 || !cells.adds(phi, Part::Whole) {
             return Some(velocity);

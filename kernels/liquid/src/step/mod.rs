@@ -1,7 +1,8 @@
 //! A liquid moved frame by frame: substeps short enough for its speed, each of them the surface moved, the velocity
 //! carried along, forces added, and divergence driven out.
 //!
-//! Order of a substep: velocity continued past the liquid → surface moved → sources fill, sinks empty → velocity carried
+//! Order of a substep: velocity continued past the liquid → surface moved, past solids as they are in the substep's middle; from
+//! here on they are where they are at its end → sources fill, sinks empty → velocity carried
 //! onto the new liquid → gravity, read at the substep's middle → pressure, and viscosity
 //! with it ([`Coupling`]). Liquid that touches nothing moves with the mean of the velocities before and after, and falls by
 //! ½g·t² in substeps of any length; other liquid moves with the velocity before.
@@ -40,6 +41,7 @@ mod fullness;
 mod motion;
 mod outflow;
 mod part;
+mod passed;
 mod pour;
 mod project;
 mod shape_cells;
@@ -131,7 +133,8 @@ pub struct LiquidSettings {
     pub coupling: Coupling,
     /// Share of the shear stress at closed walls and solids that is dropped: 0 no slip, 1 free slip.
     pub slip: f32,
-    /// Cells that liquid moves in a substep, at most; one face in 10,000 may move up to twice as far.
+    /// Cells that liquid and the surfaces of solids move in a substep, at most; one face of the liquid in 10,000 may move up to
+    /// twice as far, and solids at most a cell.
     pub cfl: f64,
     /// Most substeps of a frame; with fewer than `cfl` asks for, they are longer.
     pub max_substeps: u32,
@@ -204,6 +207,8 @@ pub struct LiquidReport {
     pub stored_cells: usize,
     /// What flowed out through open walls, m³.
     pub left_domain: f64,
+    /// What was before a solid that moves too far in a substep, and is behind it since, m³.
+    pub passed_through: f64,
     /// What sources gave, m³.
     pub sourced: f64,
     /// What sinks took, m³.
@@ -230,6 +235,7 @@ impl LiquidReport {
         self.liquid_cells = other.liquid_cells;
         self.stored_cells = self.stored_cells.max(other.stored_cells);
         self.left_domain += other.left_domain;
+        self.passed_through += other.passed_through;
         self.sourced += other.sourced;
         self.sunk += other.sunk;
         (0..3).for_each(|axis| self.solid_force[axis] += other.solid_force[axis]);
@@ -241,8 +247,9 @@ impl LiquidReport {
 const RARE: usize = 10_000;
 const FASTER: f64 = 2.0;
 
-/// Cells that a solid thinner than two and a half moves in a substep, at most: one that moves farther leaves liquid on its other side.
-const THIN_WAY: f64 = 0.5;
+/// Cells that the surface of a solid moves along its normal in a substep, at most, however large `cfl` is: liquid that does not
+/// yet move as the solid does loses what the solid moves over.
+const SOLID_WAY: f64 = 1.0;
 
 /// Share of a frame that a substep takes in which pouring begins or ends: it does so at the end of a substep.
 const BEGINNING: f64 = 1e-6;
@@ -357,8 +364,9 @@ impl<S: Surface> Liquid<S> {
     /// The next of at most `allowed` substeps between two times.
     fn plan(&self, around: &Surroundings<'_>, [from, to]: [f64; 2], allowed: u32) -> Plan {
         let (left, allowed) = (to - from, f64::from(allowed.max(1)));
-        let longest =
-            self.longest_substep((around.gravity)(from)).min(THIN_WAY * self.settings.cell / around.thin_speed);
+        let solid_speed = around.solid.map_or(0.0, |solid| solid.speed);
+        let solid_longest = self.settings.cfl.min(SOLID_WAY) * self.settings.cell / solid_speed;
+        let longest = self.longest_substep((around.gravity)(from)).min(solid_longest);
         let wanted = (left / longest).ceil().max(1.0);
         let is_capped = wanted > allowed;
         let count = if is_capped { allowed } else { wanted };

@@ -24,13 +24,15 @@ pub(super) struct Pour {
     wanted: f64,
     /// What does.
     granted: f64,
+    /// Whether the pressure decides about the velocity of none of them.
+    is_imposed: bool,
     /// What it is made of.
     material: LiquidMaterial,
 }
 
 impl Pour {
     pub(super) fn new(holder: Holder, cells: Vec<Cell>, wanted: f64) -> Self {
-        Self { holder, cells, wanted, granted: 0.0, material: LiquidMaterial::default() }
+        Self { holder, cells, wanted, granted: 0.0, is_imposed: false, material: LiquidMaterial::default() }
     }
 
     /// The same of this material.
@@ -44,8 +46,8 @@ impl Pour {
         self.wanted.abs() / (6.0 * side * side)
     }
 
-    /// Enters what was granted into its account.
-    pub(super) fn enter(&self, motion: &mut Motion) {
+    /// Enters what was granted, in a substep of so many seconds, into its account.
+    pub(super) fn enter(&self, motion: &mut Motion, seconds: f64) {
         let account = match self.holder {
             Holder::Source(n) => &mut motion.sources[n],
             Holder::Sink(n) => &mut motion.sinks[n],
@@ -54,9 +56,10 @@ impl Pour {
         if motion.materials.is_some() && self.granted > 0.0 {
             motion.stirred.push(Stir::new(self.cells.clone(), self.granted, self.material));
         }
-        // What nothing gives way to is not made good later.
+        // What nothing gives way to is not made good later. Where a nozzle imposes the velocity of all of its liquid, nothing was
+        // asked: there is room again once that has moved on, for what the rate gives until then.
         if self.granted / self.wanted < 1.0 - ROUNDING {
-            account.withhold_beyond(0.0);
+            account.withhold_beyond(if self.is_imposed { account.expected * seconds } else { 0.0 });
         }
     }
 
@@ -93,6 +96,7 @@ pub(super) fn pour(pours: &mut [Pour], solver: &PressureSolver, cell: f64, inflo
         }
     }
     for (pour, targets) in pours.iter_mut().zip(targets) {
+        pour.is_imposed = targets.is_empty();
         for (at, target) in targets {
             inflow[at] += target;
             pour.granted += target * cell * cell;

@@ -101,7 +101,7 @@ impl Projection<'_> {
             ViscousSolve::Decoupled => self.by_pressure_then_viscosity(pours, faces, &mut motion.guess),
             ViscousSolve::LeftOut => self.by_pressure(self.speed.max(self.pull), pours, faces, &mut motion.guess),
         };
-        pours.iter().for_each(|pour| pour.enter(motion));
+        pours.iter().for_each(|pour| pour.enter(motion, self.seconds));
         LiquidReport { viscous_substeps: u32::from(solve != ViscousSolve::LeftOut), ..report }
     }
 

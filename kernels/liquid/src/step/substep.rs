@@ -10,6 +10,7 @@ use crate::step::first::begin;
 use crate::step::flight::Flight;
 use crate::step::motion::{Gain, LiquidCells, Motion, largest_of};
 use crate::step::outflow::outflow;
+use crate::step::passed::passed_over;
 use crate::step::project::{Materials, Projection};
 use crate::step::sources::{LiquidSink, LiquidSource, Span};
 use crate::step::turned;
@@ -26,8 +27,6 @@ pub struct Surroundings<'a> {
     pub viscosity: &'a (dyn Fn(f64) -> f64 + Sync),
     /// What liquid does not enter.
     pub solid: Option<Solid<'a>>,
-    /// The speed of the fastest solid that is thinner than two and a half cells, m/s: substeps are short enough to see it on its way.
-    pub thin_speed: f64,
     /// Where liquid comes in. Their order is that of their accounts: it stays from frame to frame.
     pub sources: &'a [LiquidSource<'a>],
     /// Where it is taken away; likewise.
@@ -42,7 +41,7 @@ impl<'a> Surroundings<'a> {
         gravity: &'a (dyn Fn(f64) -> [f64; 3] + Sync),
         viscosity: &'a (dyn Fn(f64) -> f64 + Sync),
     ) -> Self {
-        Self { gravity, viscosity, solid: None, thin_speed: 0.0, sources: &[], sinks: &[], cancelled: &|| false }
+        Self { gravity, viscosity, solid: None, sources: &[], sinks: &[], cancelled: &|| false }
     }
 }
 
@@ -102,15 +101,20 @@ impl<'a> Moving<'a> {
     /// `direction` is −1 instead of 1.
     pub(crate) fn held(&self, from: Vec3, way: Vec3, direction: f32) -> Option<Held> {
         let (solid, from) = (self.solid?, self.periods.home_point(from));
-        if solid.distance(from) > length(way) + FASTEST {
+        // The solid is where it is in the middle of the substep, and half its way from where the liquid's way begins and from
+        // where that ends.
+        if solid.distance(from) > length(way) + 1.5 * self.solid_way() {
             return None;
         }
-        // The solid is where it is in the middle of the substep, and so far from where the way begins and from where it
-        // ends.
         let half = scale(solid.velocity(from), 0.5 * direction * self.step);
         let moved = scale(half, 2.0);
         let held = held(&|point| solid.distance(point), add(from, half), sub(way, moved))?;
         Some(Held { way: add(held.way, moved), ..held })
+    }
+
+    /// Cells that the solid's surface moves, at most.
+    pub(crate) fn solid_way(&self) -> f32 {
+        self.solid.map_or(0.0, |solid| solid.speed() * self.step)
     }
 }
 
@@ -125,9 +129,6 @@ const SLOPING_LAYERS: u32 = 2;
 /// Cells that liquid is followed over in a substep, at most, so that a substep takes a bounded time: what moves farther ends
 /// anywhere.
 pub(super) const FARTHEST: f32 = 64.0;
-
-/// Cells that a solid moves in a substep, at most, for liquid to notice it on its way.
-const FASTEST: f32 = 2.5;
 
 /// Cells past the liquid whose velocity is needed where nothing moves farther than `reach` cells: a surface follows the flow
 /// as far as it may come.
@@ -150,16 +151,16 @@ pub(super) fn substep(
 ) -> LiquidReport {
     let times = span.times;
     let (seconds, middle) = (times[1] - times[0], 0.5 * (times[0] + times[1]));
-    // Where it is and how it moves at the middle of the substep is what pushes the liquid.
-    let solid = around.solid.map(|solid| solid.at(middle));
+    // The liquid follows what the solid is on the way, in the middle, and is pushed by it from where both are at the end.
+    let [on_way, solid] = [middle, times[1]].map(|time| around.solid.map(|solid| solid.at(time)));
     let step = (seconds / settings.cell) as f32;
     let gravity = (around.gravity)(middle).map(|g| g * seconds);
     let first = begin(settings, surface, motion, around, span);
-    let moving = continued(&settings.domain, motion, gravity, solid, seconds, step);
+    let moving = continued(&settings.domain, motion, gravity, on_way, seconds, step);
     let Continued { velocity, carried, before: flown, way, reach } = moving;
     let periods = settings.domain.periods();
-    let flow = Moving { velocity: &velocity, step, periods, solid };
-    let outflow = outflow(&settings.domain, surface.view(), &flow, solid, settings.cell_volume());
+    let flow = Moving { velocity: &velocity, step, periods, solid: on_way };
+    let outflow = outflow(&settings.domain, surface.view(), &flow, on_way, settings.cell_volume());
     let left_domain = outflow.iter().map(|outflow| outflow.volume).sum();
     motion.outflow.extend(outflow);
     motion.carry(&flow, surface.view(), settings);
@@ -167,6 +168,8 @@ pub(super) fn substep(
     if let Some(solid) = solid {
         surface.meet(&|point| solid.distance(point));
     }
+    let passed =
+        around.solid.map_or(0.0, |solid| passed_over(&surface.view(), motion, &settings.domain, &flow, (solid, times)));
     let mut exchanged = Exchange { settings, around, solid, span }.apply(surface, motion);
 
     let mut cells = LiquidCells::of(&settings.domain, surface, solid);
@@ -204,6 +207,7 @@ pub(super) fn substep(
     report.stored_cells = stored_cells;
     report.liquid_cells = cells.liquid.len();
     report.left_domain = left_domain;
+    report.passed_through = passed * settings.cell_volume();
     motion.gain = (settings.splitting == Splitting::KeepsSpin).then(|| {
         let gained =
             |axis: usize| faces[axis].iter().zip(&before[axis]).map(|(after, before)| after - before).collect();

@@ -76,6 +76,22 @@ fn shapes_that_move_too_far_in_a_frame_are_counted() {
     assert_eq!(fast, [0.0, 2.0, 0.0]);
 }
 
+/// A plate of three cells moves by eight through a block that is 0.5 m high and wide: five cells of it are behind the plate.
+#[test]
+fn what_a_collider_passes_over_is_counted() {
+    let plate = |x: f32| cuboid([x, -1.0, -1.0], [x + 3.0 / 16.0, 2.0, 2.0]);
+    let passed = |step: f32| {
+        let bench = solving(cuboid([3.0 / 16.0, 0.25, 0.25], [1.0, 0.75, 0.75]))
+            .set(GRAVITY, [0.0; 3])
+            .set(MAX_SUBSTEPS, 1)
+            .moving(COLLIDERS, move |frame| plate(step * (frame.number() as f32 - 1.0)).into());
+        metric(&bench.frames(1..=2)[1], PASSED_THROUGH)
+    };
+    let exact = 5.0 / 16.0 * 0.25;
+    assert!((passed(0.5) / exact - 1.0).abs() < 0.05, "{}", passed(0.5));
+    assert_eq!(passed(0.125), 0.0);
+}
+
 #[test]
 fn what_is_left_out_at_the_start_is_told() {
     let of = |bench: Bench, name: Metric| metric(&bench.cook(), name);

@@ -66,7 +66,7 @@ fn a_plate_drags_liquid_along() {
     let domain = Domain { walls: [PERIODIC, [Wall::Closed; 2], PERIODIC], ..Domain::closed([0; 3], [4, n, 2]) };
     let mut liquid = Liquid::new(decoupled(domain, 0.1), PlainLevelSet::new(domain, |_| -9.0));
     let distance = |_: f64, p: Vec3| top - p[1];
-    let solid = Solid { distance: &distance, velocity: &|_, _| [0.5, 0.0, 0.0] };
+    let solid = Solid { distance: &distance, velocity: &|_, _| [0.5, 0.0, 0.0], speed: 0.0 };
     let around = Surroundings { solid: Some(solid), ..Surroundings::new(&|_| [0.0; 3], &|_| 1e5) };
     let report = (0..4).fold(LiquidReport::default(), |mut report, _| {
         report.add(&liquid.step_frame(&around, 1.0 / 24.0));

@@ -81,7 +81,7 @@ fn a_plate_over_liquid_without_end_is_held_back_on_all_of_its_area() {
         let mut velocity = [0.0; 3];
         velocity[axis] = 0.5;
         let (plate, moving) = (|_: f64, p: Vec3| 8.0 - p[1], |_: f64, _: Vec3| velocity);
-        let solid = Some(Solid { distance: &plate, velocity: &moving });
+        let solid = Some(Solid { distance: &plate, velocity: &moving, speed: 0.0 });
         let around = Surroundings { viscosity: &|_| 1e4, solid, ..WEIGHTLESS };
         let reports: Vec<LiquidReport> = (0..4).map(|_| liquid.step_frame(&around, FRAME)).collect();
         assert!(reports.iter().all(|report| report.solves_cut_short == 0), "{axis} {count}: {reports:?}");

@@ -110,3 +110,35 @@ fn a_thick_ball_keeps_its_angular_momentum() {
         assert!(drift < 0.1 && (volume - 1.0).abs() < 5e-3, "{drift} {volume}");
     }
 }
+
+/// What is left after a quarter of a turn of the angular momentum of a bar of 24 × 6 × 6 cells that spins about z, ÷ what is left
+/// of its volume.
+fn bar_spun(substeps: u32) -> f64 {
+    let (half, centre) = ([12.0, 3.0, 3.0], [38.3, 37.8, 9.1]);
+    let bar = |p: Vec3| (0..3).map(|axis| (p[axis] - centre[axis]).abs() - half[axis]).fold(f32::MIN, f32::max);
+    let domain = Domain::closed([0; 3], [76, 76, 18]);
+    let surface = MarkedSurface::new(domain, 1, bar, 0, 1);
+    let mut liquid = Liquid::new(LiquidSettings { cfl: 1e9, ..LiquidSettings::new(domain, 1.0) }, surface);
+    liquid.set_velocity(|p| cross([0.0, 0.0, TURN], sub(p, centre)), &WEIGHTLESS);
+    let start = Sums::of(&liquid);
+    for _ in 0..substeps / 4 {
+        liquid.step_frame(&WEIGHTLESS, 1.0 / f64::from(substeps));
+    }
+    let end = Sums::of(&liquid);
+    println!(
+        "{substeps} substeps a turn: {:.3}, volume {:.3}",
+        end.own_spin() / start.own_spin(),
+        end.volume / start.volume
+    );
+    end.own_spin() / start.own_spin() / (end.volume / start.volume)
+}
+
+/// Its ends fly apart as sheets thinner than cells, which are lost with what they carry: what is left spins as before. Summed by
+/// cells instead, it would seem to gain 13 %, since sheets count as whole cells.
+#[test]
+fn a_bar_that_flies_apart_gains_no_spin() {
+    for (substeps, most) in [(38, 0.03), (100, 0.015)] {
+        let kept = bar_spun(substeps);
+        assert!((kept - 1.0).abs() < most, "{substeps}: {kept}");
+    }
+}

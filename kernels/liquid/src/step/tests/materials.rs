@@ -127,7 +127,7 @@ fn layers_share_the_shear_by_their_viscosities() {
     let (domain, &Cylinders { n, a, b }) = (cylinders.domain(), &cylinders);
     let (size, m) = (n as f32, 0.3 * n as f32);
     let (distance, turning) = (|_: f64, p: Vec3| cylinders.distance(p), |_: f64, p: Vec3| cylinders.velocity(p));
-    let solid = Solid { distance: &distance, velocity: &turning };
+    let solid = Solid { distance: &distance, velocity: &turning, speed: 0.0 };
     let around = Surroundings { solid: Some(solid), ..WEIGHTLESS };
     for [inner, outer] in [[1e5_f32, 1e6], [1e6, 1e5]] {
         let settings =

@@ -23,7 +23,7 @@ fn pushed(viscosity: f64) -> [f64; 2] {
     for frame in 0..24 {
         let now = f64::from(frame) / 24.0;
         let distance = |time: f64, p: Vec3| p[0] - place(now + time) as f32;
-        let solid = Solid { distance: &distance, velocity: &|_, _| [speed, 0.0, 0.0] };
+        let solid = Solid { distance: &distance, velocity: &|_, _| [speed, 0.0, 0.0], speed: f64::from(speed) };
         let around = Surroundings { viscosity: &viscosity, solid: Some(solid), ..FALLING };
         let report = liquid.step_frame(&around, 1.0 / 24.0);
         assert_eq!((report.caps_hit, report.solves_cut_short), (0, 0), "{report:?}");
@@ -45,7 +45,7 @@ fn between_cylinders(n: i32) -> f32 {
     let cylinders = Cylinders::new(n);
     let (domain, &Cylinders { a, b, .. }) = (cylinders.domain(), &cylinders);
     let (distance, turning) = (|_: f64, p: Vec3| cylinders.distance(p), |_: f64, p: Vec3| cylinders.velocity(p));
-    let solid = Solid { distance: &distance, velocity: &turning };
+    let solid = Solid { distance: &distance, velocity: &turning, speed: 0.0 };
     let viscosity = |_| 1e5;
     let around = Surroundings { viscosity: &viscosity, solid: Some(solid), ..WEIGHTLESS };
     let settings = LiquidSettings { tolerance: 1e-6, cfl: 1e9, ..LiquidSettings::new(domain, 1.0 / f64::from(n)) };

@@ -441,3 +441,24 @@ fn a_nozzle_gives_any_rate_steadily_from_the_first_frame_on() {
         assert!(steady && (sum - 1.0).abs() < 0.05, "{radius} {share}: {sum} {shares:?}");
     }
 }
+
+/// A rate 5 % above section · velocity, of a narrow nozzle whose liquid all moves at the velocity that it imposes: pressure has
+/// nothing to say there, so nothing can pour.
+#[test]
+fn a_nozzle_that_is_a_little_too_narrow_gives_its_rate() {
+    let domain = Domain::closed([0; 3], [16, 60, 16]);
+    let mut liquid = Liquid::new(LiquidSettings::new(domain, 0.04), marked(domain, |_| 5.0));
+    let distance = |_: f64, p: Vec3| (length([p[0] - 7.5, 0.0, p[2] - 7.5]) - 2.0).max((p[1] - 55.0).abs() - 2.0);
+    let given = 1.05 * std::f64::consts::PI * 4.0 * 1.6e-3 * 2.0;
+    let (rate, velocity) = (move |from: f64, to: f64| given * (to - from), |_: f64| [0.0, -2.0, 0.0]);
+    let sources = [LiquidSource { velocity: Some(&velocity), ..LiquidSource::new(shape(&distance), Some(&rate)) }];
+    let around = Surroundings { sources: &sources, ..WEIGHTLESS };
+    let mut sourced = 0.0;
+    for frame in 1..=20 {
+        sourced += liquid.step_frame(&around, FRAME).sourced;
+        let account = liquid.sources()[0];
+        assert!(account.withheld == 0.0, "{frame}: {account:?}");
+        let late = f64::from(frame) - sourced / (given * FRAME);
+        assert!(late.abs() < 0.15, "{frame}: {late} frames late");
+    }
+}

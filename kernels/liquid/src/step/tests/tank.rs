@@ -36,7 +36,11 @@ fn a_closed_tank_takes_its_liquid_along() {
         let place = moved(f64::from(frame) * FRAME);
         tank = tank.next_frame(&topology, &points.iter().map(|p| add(*p, place)).collect::<Vec<_>>());
         let distance = |time: f64, p: Vec3| tank.distance((time / FRAME) as f32, p);
-        let solid = Solid { distance: &distance, velocity: &|_, _| velocity };
+        let solid = Solid {
+            distance: &distance,
+            velocity: &|_, _| velocity,
+            speed: f64::from(numerics::vector::length(velocity)),
+        };
         let mut liquid = Liquid::resume(settings.clone(), surface, motion);
         liquid.step_frame(&Surroundings { solid: Some(solid), ..around }, FRAME);
         (surface, motion) = liquid.into_parts();
