@@ -80,6 +80,7 @@ impl Segment<'_> {
     }
 
     /// The sector of a turn from one unit vector towards another.
+    #[inline(always)]
     pub(super) fn sector(&self, from: DVec3, towards: DVec3) -> Sector {
         let axis = from.cross(&towards);
         let sine = axis.norm();
@@ -127,6 +128,7 @@ impl Segment<'_> {
         to_f32(self.pivot + direction * self.inner)
     }
 
+    #[inline(always)]
     fn crosses(&self, direction: &DVec3, nearby: &Nearby<'_>) -> Option<Crossing> {
         first_crossing(nearby, self.start(direction), self.end(direction))
     }
@@ -333,6 +335,7 @@ impl Sector {
     }
 
     /// Bounds of everything it sweeps while it turns to the unit vector `end` in its plane.
+    #[inline(always)]
     pub(super) fn bounds(&self, end: &DVec3) -> (Vec3, Vec3) {
         let (sine, cosine) = (end.dot(&self.v), end.dot(&self.u));
         let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
