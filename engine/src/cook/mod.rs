@@ -134,7 +134,7 @@ impl Engine {
     ) -> Result<Report, Stopped<E>> {
         let plan = self.plan(graph, request).map_err(Stopped::Asked)?;
         let plan = if disk.is_some() { plan.keeping_all_outputs() } else { plan };
-        self.pool.install(|| Sweep::new(self, &plan, Executor::Cook, disk, cancel).run(sink))
+        self.pool.install(|| Sweep::new(self, &plan, Executor::Cook, disk, cancel).ending_the_plan().run(sink))
     }
 
     /// Cooks `nodes` (indices in [`Graph::nodes`]) for a request instead of its outputs, and keeps their results on disk,

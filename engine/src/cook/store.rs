@@ -15,14 +15,23 @@ pub(crate) type Metrics = Vec<(&'static str, f64)>;
 struct Entry {
     cooked: Cooked,
     metrics: Metrics,
-    bytes: usize,
     used: u64,
 }
 
-/// Results by key; the least recently used go first.
+/// An array of kept results.
+#[derive(Default)]
+struct Array {
+    bytes: usize,
+    /// How often results have it.
+    holders: usize,
+}
+
+/// Results by key; the least recently used go first. Arrays that several of them share count once.
 #[derive(Default)]
 pub(crate) struct Store {
     entries: BTreeMap<ContentKey, Entry>,
+    /// Their arrays, by address, which entries keep alive.
+    arrays: BTreeMap<usize, Array>,
     bytes: usize,
     budget: usize,
     clock: u64,
@@ -46,11 +55,17 @@ impl Store {
 
     pub(crate) fn keep(&mut self, key: ContentKey, cooked: &Cooked, metrics: Metrics) {
         self.clock += 1;
-        let bytes = cooked.iter().map(|geometry| geometry.bytes()).sum();
-        let entry = Entry { cooked: cooked.clone(), metrics, bytes, used: self.clock };
-        self.bytes += bytes;
+        for (address, bytes) in cooked.iter().flat_map(|geometry| geometry.arrays()) {
+            let array = self.arrays.entry(address).or_default();
+            if array.holders == 0 {
+                array.bytes = bytes;
+                self.bytes += bytes;
+            }
+            array.holders += 1;
+        }
+        let entry = Entry { cooked: cooked.clone(), metrics, used: self.clock };
         if let Some(old) = self.entries.insert(key, entry) {
-            self.bytes -= old.bytes;
+            self.release(&old);
         }
         self.make_room(self.budget);
     }
@@ -67,7 +82,19 @@ impl Store {
 
     pub(crate) fn drop(&mut self, key: ContentKey) {
         if let Some(entry) = self.entries.remove(&key) {
-            self.bytes -= entry.bytes;
+            self.release(&entry);
+        }
+    }
+
+    /// Counts the arrays of an entry that is no longer kept.
+    fn release(&mut self, entry: &Entry) {
+        for (address, _) in entry.cooked.iter().flat_map(|geometry| geometry.arrays()) {
+            let Some(array) = self.arrays.get_mut(&address) else { continue };
+            array.holders -= 1;
+            if array.holders == 0 {
+                self.bytes -= array.bytes;
+                self.arrays.remove(&address);
+            }
         }
     }
 
@@ -95,6 +122,23 @@ mod tests {
         store.keep(c, &points(10), Vec::new());
         assert!(store.contains(a) && !store.contains(b) && store.contains(c));
         assert_eq!(store.bytes(), 240);
+    }
+
+    #[test]
+    fn an_array_that_results_share_counts_once() {
+        let mut store = Store::new(1000);
+        let [a, b, c] = [1, 2, 3].map(|k| ContentKey([k; 16]));
+        let shared = points(50);
+        store.keep(a, &shared, Vec::new());
+        store.keep(b, &Arc::from([shared[0].clone(), points(5)[0].clone()]), Vec::new());
+        assert_eq!(store.bytes(), 660);
+        store.keep(a, &points(10), Vec::new());
+        assert_eq!(store.bytes(), 780);
+        store.keep(c, &shared, Vec::new());
+        store.drop(b);
+        assert_eq!(store.bytes(), 720);
+        store.make_room(0);
+        assert!(store.bytes() == 0 && store.arrays.is_empty());
     }
 
     #[test]

@@ -247,3 +247,14 @@ fn memory_does_not_grow_with_the_number_of_frames() {
     let few = engine(100);
     assert!(engine(1000) <= few + few / 50, "{} for 1,000 frames, {few} for 100", engine(1000));
 }
+
+#[test]
+fn nothing_made_of_given_geometry_outlives_its_cook() {
+    let engine = engine(1, 1 << 30);
+    let mut graph = TestGraph::new(1, 4);
+    let given = graph.still("given", crate::builder::row(&[0.0; 1000]));
+    let still = graph.add("still", &ADD).set("amount", 1.0_f32).wire("points", given).done();
+    graph.add("moving", &CLOCK).wire("points", still).out();
+    let peaks = [(); 3].map(|()| graph.cook_in(&engine, 1..=4).report.peak_bytes);
+    assert_eq!(peaks, [peaks[0]; 3]);
+}

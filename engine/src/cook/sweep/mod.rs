@@ -95,6 +95,8 @@ struct NodeRun<'p> {
     call_time: Duration,
     /// Keys of results that are kept because later frames may have the same, or read them.
     held: BTreeMap<Frame, ContentKey>,
+    /// Key of the result that is the same at all frames, or read at the start, if it is kept.
+    reread: Option<ContentKey>,
     masks: Masks,
     /// Metrics that were not finite at some frame.
     left_out_metrics: BTreeSet<&'static str>,
@@ -110,6 +112,8 @@ pub(super) struct Sweep<'p, 'g, 'e> {
     disk: Option<&'e mut DiskCache>,
     /// Nodes whose results are made and kept, instead of the outputs; empty: the outputs.
     until: Vec<usize>,
+    /// Whether no later cook has this plan.
+    ends_plan: bool,
     cancel: &'p AtomicBool,
     keys: Keys<'p, 'g>,
     nodes: Vec<NodeRun<'p>>,
@@ -142,6 +146,7 @@ impl<'p> NodeRun<'p> {
             on_disk: OnDisk::default(),
             call_time: Duration::MAX,
             held: BTreeMap::new(),
+            reread: None,
             masks: Masks::new(),
             left_out_metrics: BTreeSet::new(),
             jumps: Jumps::default(),
@@ -176,6 +181,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             executor,
             disk: disk.filter(|_| !given),
             until: Vec::new(),
+            ends_plan: false,
             cancel,
             keys: Keys::new(plan, cancel),
             nodes: (0..plan.graph.nodes.len()).map(|index| NodeRun::new(plan, index, cancel)).collect(),
@@ -196,8 +202,37 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
         self
     }
 
+    /// Keeps nothing that only a later cook of the same plan would find: nobody has the plan afterwards.
+    pub(super) fn ending_the_plan(mut self) -> Self {
+        self.ends_plan = true;
+        self
+    }
+
     pub(super) fn run<E: Send>(mut self, sink: &mut Sink<'_, E>) -> Result<Report, Stopped<E>> {
         let watch = Stopwatch::start();
+        let cooked = self.cook_slices(sink);
+        if self.ends_plan {
+            self.forget_given();
+        }
+        cooked?;
+        let disk = self.disk.iter().flat_map(|disk| disk.notes());
+        self.report.notes.extend(disk.map(|text| Note::new(kind::CACHE, text)));
+        self.note_frames_outside();
+        self.note_missing_attributes();
+        self.note_empty_outputs();
+        self.note_coarse_positions();
+        self.note_zero_masks();
+        self.note_masks_outside();
+        self.report_jumps();
+        self.note_warnings();
+        let window = |(index, run): (usize, NodeRun<'_>)| NodeReport { window: self.keys.window(index), ..run.report };
+        self.report.nodes = self.nodes.into_iter().enumerate().map(window).collect();
+        self.report.wall = watch.wall();
+        self.report.cpu = watch.cpu();
+        Ok(self.report)
+    }
+
+    fn cook_slices<E: Send>(&mut self, sink: &mut Sink<'_, E>) -> Result<(), Stopped<E>> {
         let plan = self.plan;
         let chains = plan
             .graph
@@ -226,21 +261,7 @@ impl<'p, 'g, 'e> Sweep<'p, 'g, 'e> {
             }
             self.keys.forget_before(slice[0].floor_number());
         }
-        let disk = self.disk.iter().flat_map(|disk| disk.notes());
-        self.report.notes.extend(disk.map(|text| Note::new(kind::CACHE, text)));
-        self.note_frames_outside();
-        self.note_missing_attributes();
-        self.note_empty_outputs();
-        self.note_coarse_positions();
-        self.note_zero_masks();
-        self.note_masks_outside();
-        self.report_jumps();
-        self.note_warnings();
-        let window = |(index, run): (usize, NodeRun<'_>)| NodeReport { window: self.keys.window(index), ..run.report };
-        self.report.nodes = self.nodes.into_iter().enumerate().map(window).collect();
-        self.report.wall = watch.wall();
-        self.report.cpu = watch.cpu();
-        Ok(self.report)
+        Ok(())
     }
 
     fn cancelled(&self) -> bool {

@@ -2,6 +2,7 @@
 
 use super::Sweep;
 use crate::cook::store::Cooked;
+use crate::graph::Body;
 use crate::key::ContentKey;
 use crate::time::Frame;
 
@@ -18,16 +19,17 @@ impl Sweep<'_, '_, '_> {
     }
 
     fn keep_reread(&mut self, node: usize, frame: Frame) {
-        let Some(Ok(cooked)) = self.nodes[node].results.get(&frame) else { return };
+        let Some(Ok(cooked)) = self.nodes[node].results.get(&frame).cloned() else { return };
         let Ok(resolved) = self.keys.resolve(node, frame) else { return };
         self.own.insert(resolved.key);
+        self.nodes[node].reread = Some(resolved.key);
         if self.executor.remembers_costs() {
             self.engine.note_verified(resolved.key, &self.nodes[node].report);
         }
         let metrics = self.published(node, frame);
         self.engine.store(|store| {
             if !store.contains(resolved.key) {
-                store.keep(resolved.key, cooked, metrics);
+                store.keep(resolved.key, &cooked, metrics);
             }
         });
     }
@@ -117,6 +119,22 @@ impl Sweep<'_, '_, '_> {
             run.states.retain(|segment, state| segment.until == i64::MAX || state.moved == self.slices);
         }
         self.slices += 1;
+    }
+
+    /// Drops what is kept of given geometry and of what was made of it: keys of these are of this plan alone. They would
+    /// take the place of results that later cooks find.
+    pub(super) fn forget_given(&mut self) {
+        let plan = self.plan;
+        let mut of_given: Vec<bool> = Vec::with_capacity(self.nodes.len());
+        // Nodes stand behind their sources.
+        for (node, run) in self.nodes.iter_mut().enumerate() {
+            let is_given = matches!(plan.graph.nodes[node].body, Body::Given { .. });
+            of_given.push(is_given || plan.dag.sources(node).any(|source| of_given[source]));
+            if of_given[node] {
+                let held = std::mem::take(&mut run.held).into_values().chain(run.reread.take());
+                held.for_each(|key| self.engine.store(|store| store.drop(key)));
+            }
+        }
     }
 
     pub(super) fn end_slice(&mut self) {

@@ -1,7 +1,7 @@
 //! Sixteen hairs side by side, turned as their guides are.
 
 use super::hairs::{CurveDeform, DeformedCurves};
-use super::turns::{LaneTurns, NO_GUIDE};
+use super::turns::{LaneRows, LaneTurns, NO_GUIDE};
 use crate::attach::RootPose;
 use crate::collide::ClearLanes;
 use nalgebra::{Quaternion, Unit};
@@ -20,8 +20,8 @@ pub(super) struct Share {
     weight: F64x16,
     /// The weight times the rotation from the guide's frame to the hair's, row by row.
     matrix: [F64x16; 9],
-    /// The guide's segment where the last lookup ended; see [`super::GuideTurns::at`].
-    rows: [u32; LANES],
+    /// Where the last lookup ended; see [`super::GuideTurns::at`].
+    at: LaneRows,
 }
 
 /// Up to sixteen successive hairs.
@@ -134,14 +134,14 @@ impl<'a> HairLanes<'a> {
         for rank in 0..self.how.weights.of(self.first).len() {
             let mut rotation = [F64x16::ZERO, F64x16::ZERO, F64x16::ZERO, F64x16([1.0; LANES])];
             let mut arm = [F64x16::ZERO; 3];
-            let mut share = Share { weight: F64x16::ZERO, matrix: [F64x16::ZERO; 9], rows: [NO_GUIDE; LANES] };
+            let (mut weight, mut firsts) = (F64x16::ZERO, [NO_GUIDE; LANES]);
             for lane in 0..self.hairs {
                 let guide = &self.how.weights.of(self.first + lane)[rank];
                 if guide.weight <= 0.0 {
                     continue;
                 }
-                share.rows[lane] = self.how.turns.first(guide.guide as usize);
-                share.weight.0[lane] = f64::from(guide.weight);
+                firsts[lane] = self.how.turns.first(guide.guide as usize);
+                weight.0[lane] = f64::from(guide.weight);
                 for part in 0..4 {
                     rotation[part].0[lane] = f64::from(guide.rotation[part]);
                 }
@@ -150,6 +150,8 @@ impl<'a> HairLanes<'a> {
                     arm[axis].0[lane] = moved[axis];
                 }
             }
+            shares.push(Share { weight, matrix: [F64x16::ZERO; 9], at: self.how.turns.start(firsts) });
+            let share = &mut shares[rank];
             share.set_matrix(&rotation);
             for row in 0..3 {
                 let [a, b, c] = [&share.matrix[3 * row], &share.matrix[3 * row + 1], &share.matrix[3 * row + 2]];
@@ -158,7 +160,6 @@ impl<'a> HairLanes<'a> {
                     offset[row].0[lane] += across;
                 }
             }
-            shares.push(share);
         }
         offset
     }
@@ -190,7 +191,7 @@ impl<'a> HairLanes<'a> {
         let mut sum = LaneTurns([F64x16::ZERO; 4]);
         let middles = self.middles(segment);
         for share in shares.iter_mut() {
-            let turns = self.how.turns.at(&middles, &mut share.rows);
+            let turns = self.how.turns.at(&middles, &mut share.at);
             sum.add_weighted(&turns, &share.weight, &share.matrix);
         }
         for lane in 0..LANES {
@@ -218,7 +219,8 @@ impl<'a> HairLanes<'a> {
             for guide in self.how.weights.of(self.first + lane) {
                 let row = self.how.turns.first(guide.guide as usize);
                 if guide.weight > 0.0 && row != NO_GUIDE {
-                    let turn = self.how.turns.at(fractions, &mut [row; LANES]).get(lane);
+                    let turns = self.how.turns;
+                    let turn = turns.at(fractions, &mut turns.start([row; LANES])).get(lane);
                     let [x, y, z, w] = guide.rotation;
                     let rotation = Unit::new_unchecked(Quaternion::new(w, x, y, z).cast::<f64>());
                     let axis = rotation * DVec3::new(turn[1], turn[2], turn[3]);

@@ -201,40 +201,55 @@ impl<'a> GuideTurns<'a> {
         &self.offsets[guide]
     }
 
-    /// The rotations at fractions of guides, interpolated between the middles of their segments; `rows` are those of the
-    /// last call for smaller fractions, or the guides' first.
+    /// The first rows of guides, for [`GuideTurns::at`].
+    #[inline(always)]
+    pub(super) fn start(&self, firsts: [u32; LANES]) -> LaneRows {
+        let middles = &self.segments.middles[..];
+        let (mut here, mut next) = (F64x16::ZERO, F64x16::ZERO);
+        for lane in 0..LANES {
+            let row = firsts[lane] as usize;
+            let pair = &middles[row..row + 2];
+            (here.0[lane], next.0[lane]) = (pair[0], pair[1]);
+        }
+        LaneRows { rows: firsts, here, next }
+    }
+
+    /// The rotations at fractions of guides, interpolated between the middles of their segments; `at` is where the last call,
+    /// for smaller fractions, has come to.
     ///
     /// Without branches: the fractions of hairs whose segments end where those of guides do are a rounding above or below
     /// the middles, which no CPU predicts.
     #[inline(always)]
-    pub(super) fn at(&self, fractions: &F64x16, rows: &mut [u32; LANES]) -> LaneTurns {
-        let middles = &self.segments.middles[..];
-        let (mut here, mut next) = (F64x16::ZERO, F64x16::ZERO);
+    pub(super) fn at(&self, fractions: &F64x16, at: &mut LaneRows) -> LaneTurns {
+        let next = &self.segments.middles[1..];
         loop {
+            let (mut is_past, mut passed) = ([0; LANES], 0);
             for lane in 0..LANES {
-                let row = rows[lane] as usize;
-                let [before, after] = [middles[row], middles[row + 1]];
-                (here.0[lane], next.0[lane]) = (before, after);
-            }
-            let mut passed = 0;
-            for lane in 0..LANES {
-                let is_past = u32::from(next.0[lane] <= fractions.0[lane]);
-                rows[lane] += is_past;
-                passed |= is_past;
+                is_past[lane] = u32::from(at.next.0[lane] <= fractions.0[lane]);
+                passed |= is_past[lane];
             }
             if passed == 0 {
                 break;
             }
+            for lane in 0..LANES {
+                at.here.0[lane] = if is_past[lane] == 1 { at.next.0[lane] } else { at.here.0[lane] };
+                at.rows[lane] += is_past[lane];
+            }
+            for lane in 0..LANES {
+                at.next.0[lane] = next[at.rows[lane] as usize];
+            }
         }
         let mut shares = F64x16::ZERO;
         for lane in 0..LANES {
-            let share = (fractions.0[lane] - here.0[lane]) / (next.0[lane] - here.0[lane]);
-            shares.0[lane] = if fractions.0[lane] > here.0[lane] { share } else { 0.0 };
+            let share = (fractions.0[lane] - at.here.0[lane]) / (at.next.0[lane] - at.here.0[lane]);
+            shares.0[lane] = if fractions.0[lane] > at.here.0[lane] { share } else { 0.0 };
         }
         let mut turns = [STILL; LANES];
         for lane in 0..LANES {
-            let (row, share) = (rows[lane] as usize, shares.0[lane]);
-            let [here, next] = [&self.turns[row], &self.turns[row + 1]];
+            let (row, share) = (at.rows[lane] as usize, shares.0[lane]);
+            // Both at once, so that the index is checked once.
+            let pair = &self.turns[row..row + 2];
+            let (here, next) = (pair[0], pair[1]);
             for part in 0..4 {
                 turns[lane][part] = here[part] + (next[part] - here[part]) * share;
             }
@@ -247,6 +262,14 @@ impl<'a> GuideTurns<'a> {
         }
         out
     }
+}
+
+/// Where sixteen hairs are on one guide each: the rows, and the middles of their segments and of the next.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LaneRows {
+    rows: [u32; LANES],
+    here: F64x16,
+    next: F64x16,
 }
 
 /// Number of rows of a guide with so many CVs.
