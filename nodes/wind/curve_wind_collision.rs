@@ -378,8 +378,10 @@ struct Roots {
 impl Roots {
     fn of(curves: &Component, rest: &Component, how: &Collide<'_>) -> Self {
         let mut found = Self::default();
+        // Looked up by name once, not for each curve.
+        let [points, rest_points] = [curves, rest].map(Component::positions);
         for root in curves.runs().ranges().filter(|cvs| !cvs.is_empty()).map(|cvs| cvs.start) {
-            let [now, before] = [curves, rest].map(|part| part.positions()[root]);
+            let (now, before) = (points[root], rest_points[root]);
             let apart = (to_f64(now) - to_f64(before)).norm();
             let lifted = how.offset_root.at(root);
             // Positions rounded to f32 may be apart by some 2⁻²³ of them.

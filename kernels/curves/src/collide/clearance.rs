@@ -51,7 +51,7 @@ impl Hair<'_> {
 /// Distance of a segment from what is near it, at most `most`.
 fn nearest(from: &DVec3, to: &DVec3, most: f64, nearby: &Nearby<'_>) -> f64 {
     let mut least = most;
-    for (block, lanes) in nearby {
+    for (block, lanes) in nearby.iter() {
         for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
             least = least.min(distance(from, to, &corners(block, lane)));
         }

@@ -15,6 +15,13 @@ use numerics::vector::{self, DQuat, DVec3, Vec3, to_f32, to_f64};
 /// Length, in gaps, at the start of the first segment that is not tested if the root may lie on the skin.
 pub(super) const SKIPPED_GAPS: f64 = 5.0;
 
+/// Number of CVs from which on segments are so short that successive ones meet the same blocks of obstacles. Blocks around a
+/// segment of a curve of five hold more than it meets.
+const MANY_CVS: usize = 16;
+
+/// How far around a segment these blocks are kept, in mean lengths of the curve's segments.
+const KEPT_SEGMENTS: f64 = 3.0;
+
 /// An input curve, and where its result is written.
 pub(super) struct Hair<'a> {
     /// Index of its root among all CVs.
@@ -71,6 +78,7 @@ impl Hair<'_> {
         if shift != DVec3::zeros() {
             self.out[0] = to_f32(goal[0]);
         }
+        nearby.keep_around(self.kept_margin());
         let largest = self.goal.iter().fold(0.0, |most: f32, cv| most.max(vector::largest(*cv)));
         let mut carried = Carried { rotation: DQuat::identity(), before: DVec3::zeros() };
         let mut change = LengthChange::default();
@@ -88,7 +96,7 @@ impl Hair<'_> {
             let (segment, ground) = self.segment(how, k, &wanted, [length, rounding], &carried, axes);
             let way_out = ground.map(|(up, rest)| WayOut { up, rest, others });
             // Not if the skin redirects the segment, or if its goal was raised.
-            let may_keep_goal = segment.to == wanted && goal[k + 1] == to_f64(self.goal[k + 1]);
+            let may_keep_goal = same(&segment.to, &wanted) && same(&goal[k + 1], &to_f64(self.goal[k + 1]));
             let direction = self.turn(how, k, (&segment, way_out.as_ref()), may_keep_goal, nearby, &mut reached);
             change.add(length, (to_f64(self.out[k + 1]) - segment.pivot).norm());
             let is_last = k + 2 == cvs;
@@ -109,6 +117,19 @@ impl Hair<'_> {
             self.measure_clearance(how, nearby, &mut reached);
         }
         reached
+    }
+
+    /// How far around a segment blocks of obstacles are kept for the next ones, metres; 0 for curves of few segments.
+    #[inline(always)]
+    fn kept_margin(&self) -> f32 {
+        if self.goal.len() < MANY_CVS {
+            return 0.0;
+        }
+        let mut whole = 0.0;
+        for k in 1..self.goal.len() {
+            whole += (to_f64(self.goal[k]) - to_f64(self.goal[k - 1])).norm();
+        }
+        (KEPT_SEGMENTS * whole / (self.goal.len() - 1) as f64) as f32
     }
 
     /// The segment from CV k, about to turn towards the unit vector `wanted`; with coherence, the
@@ -153,8 +174,11 @@ impl Hair<'_> {
     /// Length at the start of the segment from CV k that is not tested.
     #[inline(always)]
     pub(super) fn untested(&self, how: &Collide<'_>, k: usize) -> f64 {
+        if k > 0 {
+            return 0.0;
+        }
         let gap = how.gap_at(self.first);
-        if k == 0 && how.offset_root_at(self.first) < gap { SKIPPED_GAPS * gap } else { 0.0 }
+        if how.offset_root_at(self.first) < gap { SKIPPED_GAPS * gap } else { 0.0 }
     }
 
     /// Turns the segment from CV k and writes its end; returns its direction.
@@ -178,10 +202,10 @@ impl Hair<'_> {
         if !turned.met && may_keep_goal && self.out[k] == self.goal[k] {
             end = self.goal[k + 1];
         }
-        if !turned.clear && first_crossing(nearby, segment.start(&turned.direction), end).is_some() {
+        if !turned.clear && first_crossing(nearby.blocks(), segment.start(&turned.direction), end).is_some() {
             turned = turned_by(how, &segment.wary(), way_out, nearby);
             end = segment.end(&turned.direction);
-            if let Some(crossing) = first_crossing(nearby, segment.start(&turned.direction), end) {
+            if let Some(crossing) = first_crossing(nearby.blocks(), segment.start(&turned.direction), end) {
                 reached.unfreed_segments += 1;
                 reached.deepest_overlap = reached.deepest_overlap.max(crossing.depth);
             }
@@ -305,6 +329,12 @@ impl Hair<'_> {
         }
         true
     }
+}
+
+/// Whether two vectors are equal. Without the iterator of the library's comparison, which stays a loop.
+#[inline(always)]
+fn same(a: &DVec3, b: &DVec3) -> bool {
+    (a.x == b.x) & (a.y == b.y) & (a.z == b.z)
 }
 
 /// How the lengths of a curve's segments change.

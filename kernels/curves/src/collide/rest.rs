@@ -228,7 +228,7 @@ fn crosses_any<'t>(cvs: &[Vec3], shift: &DVec3, how: &Collide<'t>, nearby: &mut 
         }
         gather(how.obstacles, low, high, nearby);
         for k in first..last {
-            if first_crossing(nearby, at(k), at(k + 1)).is_some() {
+            if first_crossing(nearby.blocks(), at(k), at(k + 1)).is_some() {
                 return true;
             }
         }

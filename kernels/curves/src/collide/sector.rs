@@ -101,6 +101,7 @@ impl Sector {
     }
 
     /// Calls `found` with each interval of angles that the triangle blocks.
+    #[inline(always)]
     pub(super) fn blocked_by(&self, corners: &[DVec3; 3], mut found: impl FnMut(Blocked)) {
         if let Some(length) = self.capsule {
             return self.capsule_blocked_by(length, corners, found);
@@ -218,6 +219,7 @@ impl Sector {
 
 impl Blocked {
     /// The angles of a straight piece between two points, neither at the pivot.
+    #[inline(always)]
     pub(super) fn between(p: P2, q: P2) -> Self {
         let (first, last) = in_order(p, q);
         let (lo, hi) = (angle(first), angle(last));

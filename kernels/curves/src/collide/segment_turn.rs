@@ -7,7 +7,7 @@ use super::triangle_filter::Wedge;
 use super::turn_axes::TurnAxes;
 use super::{ContactMethod, perpendicular};
 use numerics::lanes::LANES;
-use numerics::tree::{Block, Cuboid, TriangleTree};
+use numerics::tree::{Block, Boxes, Cuboid, Region, TriangleTree};
 use numerics::vector::{DVec3, Vec3, to_f32};
 use std::f64::consts::PI;
 
@@ -50,8 +50,66 @@ pub(super) struct Turned {
     pub(super) clear: bool,
 }
 
-/// Blocks of the tree that a segment may meet, with a bit for each triangle.
-pub(super) type Nearby<'t> = Vec<(&'t Block, u16)>;
+/// Blocks of trees that a segment may meet, with a bit for each triangle.
+#[derive(Default)]
+pub(super) struct Nearby<'t> {
+    blocks: Vec<(&'t Block, u16)>,
+    kept: Kept<'t>,
+}
+
+impl<'t> Nearby<'t> {
+    /// From now on what is nearer than `margin` metres to what a segment may meet is kept for the next ones, unless that is
+    /// much; 0 keeps nothing. It pays for curves of many short segments: they meet the same few blocks one after another.
+    #[inline(always)]
+    pub(super) fn keep_around(&mut self, margin: f32) {
+        self.kept.margin = if margin > 0.0 { margin } else { 0.0 };
+        self.kept.obstacles = 0;
+    }
+
+    #[inline(always)]
+    pub(super) fn iter(&self) -> std::slice::Iter<'_, (&'t Block, u16)> {
+        self.blocks.iter()
+    }
+
+    /// Those found.
+    #[inline(always)]
+    pub(super) fn blocks(&self) -> &[(&'t Block, u16)] {
+        &self.blocks
+    }
+
+    #[inline(always)]
+    pub(super) fn is_empty(&self) -> bool {
+        self.blocks.is_empty()
+    }
+}
+
+/// Number of blocks that are kept: to go through more takes longer than to find them in a tree.
+const MOST_KEPT: usize = 16;
+
+/// The blocks in a box around segments.
+#[derive(Default)]
+struct Kept<'t> {
+    /// How much larger than the box of a segment it is on each side, metres; 0: nothing is kept.
+    margin: f32,
+    low: Vec3,
+    high: Vec3,
+    /// Address of the list of trees; 0: of none.
+    obstacles: usize,
+    /// The blocks, the boxes of their triangles, and a bit for each lane that has one.
+    blocks: Vec<(&'t Block, Boxes, u16)>,
+}
+
+impl Kept<'_> {
+    /// Whether it is of these trees and holds a box.
+    #[inline(always)]
+    fn holds(&self, obstacles: usize, low: Vec3, high: Vec3) -> bool {
+        let mut holds = self.obstacles == obstacles;
+        for axis in 0..3 {
+            holds &= (low[axis] >= self.low[axis]) & (high[axis] <= self.high[axis]);
+        }
+        holds
+    }
+}
 
 impl Segment<'_> {
     /// Turns by `method`. Afterwards `nearby` holds everything that the segment may cross in its new direction.
@@ -130,7 +188,7 @@ impl Segment<'_> {
 
     #[inline(always)]
     fn crosses(&self, direction: &DVec3, nearby: &Nearby<'_>) -> Option<Crossing> {
-        first_crossing(nearby, self.start(direction), self.end(direction))
+        first_crossing(nearby.blocks(), self.start(direction), self.end(direction))
     }
 
     /// The paper's method: small steps until one crosses.
@@ -160,7 +218,7 @@ impl Segment<'_> {
     /// farthest away from.
     fn too_near(&self, sector: &Sector, nearby: &Nearby<'_>) -> Option<DVec3> {
         let mut farthest: Option<(f64, DVec3)> = None;
-        for (block, lanes) in nearby {
+        for (block, lanes) in nearby.iter() {
             for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
                 let corners = corners(block, lane);
                 sector.blocked_by(&corners, |blocked| {
@@ -221,10 +279,45 @@ enum Sweep {
 /// Gathers all blocks of the trees that a box meets.
 #[inline(always)]
 pub(super) fn gather<'t>(obstacles: &[&'t TriangleTree], low: Vec3, high: Vec3, nearby: &mut Nearby<'t>) {
-    nearby.clear();
-    for tree in obstacles {
-        for (block, lanes) in tree.walk(Cuboid { low, high }) {
-            nearby.push((&tree.blocks()[block], lanes));
+    nearby.blocks.clear();
+    let kept = &mut nearby.kept;
+    let address = obstacles.as_ptr().addr();
+    while kept.margin == 0.0 || !kept.holds(address, low, high) {
+        let keeps = kept.margin > 0.0;
+        let mut around = Cuboid { low, high };
+        if keeps {
+            for axis in 0..3 {
+                around.low[axis] -= kept.margin;
+                around.high[axis] += kept.margin;
+            }
+            (kept.low, kept.high, kept.obstacles) = (around.low, around.high, address);
+            kept.blocks.clear();
+        }
+        'trees: for tree in obstacles {
+            for (index, lanes) in tree.walk(around) {
+                let block = &tree.blocks()[index];
+                if !keeps {
+                    nearby.blocks.push((block, lanes));
+                } else if kept.blocks.len() < MOST_KEPT {
+                    kept.blocks.push((block, block.boxes(), block.filled()));
+                } else {
+                    kept.margin = 0.0;
+                    break 'trees;
+                }
+            }
+        }
+        if !keeps {
+            return;
+        }
+        if kept.margin > 0.0 {
+            break;
+        }
+    }
+    let region = Cuboid { low, high };
+    for (block, boxes, filled) in &kept.blocks {
+        let lanes = region.meeting(boxes) & filled;
+        if lanes != 0 {
+            nearby.blocks.push((block, lanes));
         }
     }
 }
@@ -241,15 +334,16 @@ enum Stop {
     Stuck,
 }
 
-/// How far the sector may turn towards the unit vector `to` in its plane.
+/// How far the sector may turn towards the unit vector `to` in its plane. Removes from `nearby` what it cannot meet.
 #[inline(always)]
-fn first_stop(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop {
+fn first_stop(sector: &Sector, to: &DVec3, nearby: &mut Nearby<'_>) -> Stop {
     let mut until = [sector.u.dot(to), sector.v.dot(to).max(0.0)];
-    let mut wedge = Wedge::new(sector, until);
+    let mut wedge = None;
     // The angle of `to` is needed where something is met.
     let (mut stop, mut whole, mut clear): (Option<f64>, Option<f64>, bool) = (None, None, true);
-    for (block, lanes) in nearby {
-        let mut lanes = lanes & wedge.may_meet(block);
+    for (block, near) in &mut nearby.blocks {
+        *near = within(&mut wedge, sector, until, block, *near);
+        let mut lanes = *near;
         clear &= lanes == 0;
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize;
@@ -269,8 +363,8 @@ fn first_stop(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop {
             stop = Some(next);
             let (sine, cosine) = libm::sincos(next);
             until = [cosine, sine];
-            wedge = Wedge::new(sector, until);
-            lanes &= wedge.may_meet(block);
+            wedge = None;
+            lanes = within(&mut wedge, sector, until, block, lanes);
         }
     }
     match stop {
@@ -279,6 +373,22 @@ fn first_stop(sector: &Sector, to: &DVec3, nearby: &Nearby<'_>) -> Stop {
         None if clear => Stop::Clear,
         None => Stop::None,
     }
+}
+
+/// Number of triangles of a block that are tested one by one, rather than to exclude some of them sixteen at a time.
+const FEW: u32 = 2;
+
+/// Those `lanes` of a block that may be met up to the angle of this cosine and sine; `wedge` is made where it is needed.
+#[inline(always)]
+fn within(wedge: &mut Option<Wedge>, sector: &Sector, until: [f64; 2], block: &Block, lanes: u16) -> u16 {
+    if lanes.count_ones() <= FEW {
+        return lanes;
+    }
+    let wedge = match wedge {
+        Some(wedge) => wedge,
+        None => wedge.insert(Wedge::new(sector, until)),
+    };
+    lanes & wedge.may_meet(block)
 }
 
 /// The first angle up to `most` at which nothing is within the angle `kept` from a contact at a radius.
@@ -307,7 +417,7 @@ impl Taken {
         let (sine, cosine) = if most < PI { libm::sincos(most) } else { (0.0, -1.0) };
         let wedge = Wedge::new(sector, [cosine, sine]);
         let mut taken: Vec<[f64; 2]> = Vec::new();
-        for (block, lanes) in nearby {
+        for (block, lanes) in nearby.iter() {
             let mut lanes = lanes & wedge.may_meet(block);
             while lanes != 0 {
                 let lane = lanes.trailing_zeros() as usize;

@@ -1,6 +1,7 @@
 //! Turns that a half-space frees, against the sweep through the trees that they save.
 
 use super::super::crossing::first_crossing_in;
+use super::super::segment_turn::Nearby;
 use super::super::turn_axes::TurnAxes;
 use super::super::{ContactMethod, SkinSurface};
 use super::*;
@@ -59,7 +60,7 @@ fn what_a_half_space_frees_the_trees_free_too() {
         let root = DVec3::z() * (size * number(key.of(1), 0.0, 2e-4));
         let tip = root + DVec3::z() * size;
         let half_space = HalfSpace::of(&[to_f32(root), to_f32(tip)], &DVec3::zeros(), 0.1 * size, gap, &how);
-        let mut nearby = Vec::new();
+        let mut nearby = Nearby::default();
         for case in 0..3000 {
             let key = key.of(2).of(case);
             // From just above the skin, or from higher with directions that graze it.

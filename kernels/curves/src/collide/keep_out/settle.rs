@@ -102,8 +102,8 @@ impl Faces {
         self.met.clear();
         self.ends.clear();
         for one in swept {
-            for k in 0..nearby.len() {
-                let lanes = nearby[k].1 & one.meeting(&self.boxes[k]);
+            for (k, (_, lanes)) in nearby.iter().enumerate() {
+                let lanes = lanes & one.meeting(&self.boxes[k]);
                 if lanes != 0 {
                     self.met.push((k, lanes));
                 }
@@ -153,7 +153,7 @@ impl Faces {
     fn meets(&self, nearby: &Nearby<'_>, k: usize, a: Vec3, b: Vec3) -> bool {
         let first = if k == 0 { 0 } else { self.ends[k - 1] };
         for (block, lanes) in &self.met[first..self.ends[k]] {
-            if crosses_block(nearby[*block].0, &self.boxes[*block], *lanes, a, b) {
+            if crosses_block(nearby.blocks()[*block].0, &self.boxes[*block], *lanes, a, b) {
                 return true;
             }
         }
