@@ -85,19 +85,25 @@ impl StageSolver {
 
     /// As [`Self::assemble`] of the linear system, after one at the same `x` since which only contacts changed.
     pub(super) fn assemble_contacts(&mut self, stage: &Stage<'_>, x: &[DVec3]) {
-        let (v, mut r) = (std::mem::take(&mut self.v), std::mem::take(&mut self.r));
+        let v = std::mem::take(&mut self.v);
         self.measured = true;
         self.update_transient_forces(stage, x, &v);
+        self.v = v;
         self.linearise_steep_forces(stage);
+        self.complete_in_contact(stage, x);
+    }
+
+    /// Sets rank-one terms, and residual and smoother of the particles in them, after forces or linearisation of contacts
+    /// changed.
+    pub(super) fn complete_in_contact(&mut self, stage: &Stage<'_>, x: &[DVec3]) {
         self.set_rank_one_terms(stage);
-        let mut smoother = std::mem::take(&mut self.system.smoother);
+        let (mut r, mut smoother) = (std::mem::take(&mut self.r), std::mem::take(&mut self.system.smoother));
         let of_contacts = stage.contacts.iter().flat_map(ContactConstraint::sides).map(|side| side.0);
         let of_tets = self.thin_tets.iter().flat_map(|thin| thin.corners).map(|corner| corner as usize);
         for particle in of_contacts.chain(of_tets) {
             (r[particle], smoother[particle]) = self.complete(&self.system, stage, particle, x);
         }
-        self.system.smoother = smoother;
-        (self.v, self.r) = (v, r);
+        (self.r, self.system.smoother) = (r, smoother);
     }
 
     /// Residual and smoother of a particle at `x`, from what `system` has of springs, regions and external forces, with

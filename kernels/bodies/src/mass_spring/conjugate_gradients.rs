@@ -32,6 +32,8 @@ pub(super) struct Reached {
     pub(super) iterations: u32,
     /// Final ÷ initial residual.
     pub(super) share: f64,
+    /// Initial squared residual.
+    pub(super) start: f64,
     /// Whether the criteria were met.
     pub(super) met: bool,
 }
@@ -81,7 +83,7 @@ impl<'a> Coarse<'a> {
         let (mut p, mut ap) = (vec![DVec3::zeros(); r.len()], vec![DVec3::zeros(); r.len()]);
         let mut modes = Vec::new();
         let start = self.start(system, r, &mut modes);
-        let mut reached = Reached { iterations: 0, share: 0.0, met: start.is_finite() };
+        let mut reached = Reached { iterations: 0, share: 0.0, start, met: start.is_finite() };
         if !(start > f64::MIN_POSITIVE && start.is_finite()) {
             return reached;
         }

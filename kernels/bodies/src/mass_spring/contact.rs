@@ -419,13 +419,26 @@ impl ContactConstraint {
         (state.offset, state.normal_force, state.slope) = (push - state.normal_force, push, slope);
     }
 
+    /// Lets the linearised normal force of an open contact act from the gap on if the direction `dx` goes below it; returns
+    /// whether it does. The force without a motion is below 0.
+    pub(super) fn close(&self, state: &mut ContactState, dx: &[DVec3]) -> bool {
+        if state.slope > 0.0 || self.normal.dot(&self.weighted_sum(dx)) >= state.depth {
+            return false;
+        }
+        (state.normal_force, state.slope) = (self.penalty_stiffness * state.depth, self.penalty_stiffness);
+        state.offset = state.normal_force;
+        if state.mode == ContactMode::Open {
+            state.mode = ContactMode::Frictionless;
+        }
+        true
+    }
+
     /// Predicts the normal force and the friction dual after a fraction `share` of the step `dx` in a stage of `a`, as
     /// linearised. The dual has length 1 at most; it is zero where the step was cut because it would have reversed the slip.
     pub(super) fn predict(&self, state: &mut ContactState, dx: &[DVec3], share: f64, a: f64) {
         let separation = self.weighted_sum(dx);
         let along = self.normal.dot(&separation);
-        let force = (state.normal_force - state.slope * share * along).max(0.0);
-        state.predicted = if state.depth > 0.0 { force } else { 0.0 };
+        state.predicted = (state.normal_force - state.slope * share * along).max(0.0);
         let (before, most) = (std::mem::take(&mut state.dual), self.friction * self.load);
         if most <= 0.0 || state.mode == ContactMode::Open {
             return;

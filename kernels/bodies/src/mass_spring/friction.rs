@@ -42,6 +42,11 @@ impl LoadBalance {
         self.change <= TOLERATED_CHANGE && self.single <= TOLERATED_SINGLE
     }
 
+    /// Whether no more force is left on a body than its contacts exert.
+    pub(super) fn is_near(&self) -> bool {
+        self.left <= 1.0
+    }
+
     /// Whether normal forces are less wrong than the loads.
     pub(super) fn is_readable(&self) -> bool {
         self.left < READABLE * self.single

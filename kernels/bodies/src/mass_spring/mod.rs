@@ -19,6 +19,7 @@ mod assemble;
 mod balance;
 mod body;
 mod bounce;
+mod closing;
 mod coarse;
 mod conjugate_gradients;
 mod contact;

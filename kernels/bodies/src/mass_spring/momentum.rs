@@ -55,10 +55,10 @@ impl StageSolver {
         self.groups = groups.iter().map(|group| free[*group as usize].then_some(*group)).collect();
     }
 
-    /// Total residual of each group.
-    pub(super) fn momentum_target(&self, stage: &Stage<'_>) -> MomentumTarget {
+    /// What the translation of each group is to account for: the right-hand side `right` of the linear system.
+    pub(super) fn momentum_target(&self, stage: &Stage<'_>, right: &[DVec3]) -> MomentumTarget {
         let inertia = &self.system.inertia;
-        let residual = self.sums(stage, |particle| self.r[particle]);
+        let residual = self.sums(stage, |particle| right[particle]);
         let inertia = self.sums(stage, |particle| DVec3::repeat(inertia[particle]));
         let mut stiffness: Vec<DMat3> = inertia.iter().map(DMat3::from_diagonal).collect();
         let obstacle_contacts = self.obstacle_contacts(stage);

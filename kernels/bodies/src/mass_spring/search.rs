@@ -118,7 +118,7 @@ impl StageSolver {
             };
             self.store_noncontact_residual(stage);
             self.use_linearised_forces(stage);
-            if !self.direction(stage, asked, x, &mut solved) {
+            if !self.direction(stage, asked, balance.is_near(), x, &mut solved) {
                 self.watch_thin(context, x);
                 break;
             }

@@ -223,7 +223,7 @@ impl StageSolver {
                 solved.first = before;
             }
             let asked = if stage.contacts.is_empty() { CG_SHARE } else { CG_SHARE_PRECISE };
-            if !self.direction(stage, asked, x, &mut solved) {
+            if !self.direction(stage, asked, false, x, &mut solved) {
                 break;
             }
             let predicted = std::mem::take(&mut self.r);
@@ -301,12 +301,20 @@ impl StageSolver {
     }
 
     /// Computes the Newton direction `dx` at `x` until the residual `r` of the linear system has fallen to the share that is
-    /// `asked`. Returns false if the direction is not finite.
-    pub(super) fn direction(&mut self, stage: &Stage<'_>, asked: f64, x: &[DVec3], solved: &mut Solved) -> bool {
+    /// `asked`, and again with the contacts that it closes if it `closes` any. Returns false if the direction is not finite.
+    pub(super) fn direction(
+        &mut self,
+        stage: &Stage<'_>,
+        asked: f64,
+        closes: bool,
+        x: &[DVec3],
+        solved: &mut Solved,
+    ) -> bool {
         let body = stage.context.body;
         self.dx.clear();
         self.dx.resize(x.len(), DVec3::zeros());
-        let target = self.momentum_target(stage);
+        let mut right = self.r.clone();
+        let mut target = self.momentum_target(stage, &right);
         self.correct_linear_momentum(stage, &target);
         coarse::offset_from_centroid(&body.order.clusters, x, &mut self.offset_from_centroid);
         let filters = ContactFilters::new(&self.system, &self.layout);
@@ -321,20 +329,18 @@ impl StageSolver {
         let square =
             if rotational_energy > 0.0 { 2.0 * stage.a * stage.a * NOISE * rotational_energy } else { f64::INFINITY };
         let searching = !stage.contacts.is_empty() && stage.line_search;
-        let mut reached = self.gradients(body, Limits { share: asked, square, cap: bound.min(CG_CAP) });
-        solved.cg += reached.iterations;
-        if !reached.met && bound < CG_CAP {
-            // The factor is too old to be useful: continue with a new one.
-            self.renew(body, ContactFilters::new(&self.system, &self.layout));
-            let share = (asked / reached.share.max(asked)).min(1.0);
-            reached = self.gradients(body, Limits { share, square, cap: CG_CAP });
-            solved.cg += reached.iterations;
+        let first = self.gradients(body, Limits { share: asked, square, cap: bound }, solved);
+        let mut reached = first;
+        if closes && self.close_contacts(stage, x, &mut right) {
+            target = self.momentum_target(stage, &right);
+            self.correct_linear_momentum(stage, &target);
+            let enough = asked * asked * first.start;
+            reached = self.gradients(body, Limits { share: 1.0, square: enough, cap: bound }, solved);
         }
-        self.cached.iterations_since += reached.iterations;
         let usual = &mut self.cached.initial_iterations[stage.index];
         if *usual == 0 {
-            *usual = reached.iterations.max(1);
-        } else if !searching && f64::from(reached.iterations) > STALE * f64::from(*usual) + 1.0 {
+            *usual = first.iterations.max(1);
+        } else if !searching && f64::from(first.iterations) > STALE * f64::from(*usual) + 1.0 {
             self.cached = CachedCoarseFactor::default();
         }
         let gave_up = !reached.met && self.is_unsettled(body);
@@ -353,9 +359,23 @@ impl StageSolver {
         self.dx.iter().any(|d| d.norm() > least)
     }
 
-    fn gradients(&mut self, body: &SoftBody, limits: Limits) -> Reached {
-        let coarse = Coarse::new(body, &self.cached, &self.offset_from_centroid);
-        coarse.solve(&mut self.system, limits, &mut self.dx, &mut self.r)
+    /// Solves the linear system from `dx` on; with a new coarse factor if that takes more iterations than the limit.
+    fn gradients(&mut self, body: &SoftBody, limits: Limits, solved: &mut Solved) -> Reached {
+        let mut solve = |solver: &mut Self, limits| {
+            let coarse = Coarse::new(body, &solver.cached, &solver.offset_from_centroid);
+            let reached = coarse.solve(&mut solver.system, limits, &mut solver.dx, &mut solver.r);
+            solved.cg += reached.iterations;
+            solver.cached.iterations_since += reached.iterations;
+            reached
+        };
+        let first = solve(self, Limits { cap: limits.cap.min(CG_CAP), ..limits });
+        if first.met || limits.cap >= CG_CAP {
+            return first;
+        }
+        // The factor is too old to be useful.
+        self.renew(body, ContactFilters::new(&self.system, &self.layout));
+        let share = (limits.share / first.share.max(limits.share)).min(1.0);
+        Reached { start: first.start, ..solve(self, Limits { share, cap: CG_CAP, ..limits }) }
     }
 
     fn renew(&mut self, body: &SoftBody, filters: ContactFilters) {
