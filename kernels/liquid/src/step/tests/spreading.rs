@@ -8,7 +8,7 @@ use super::*;
 /// correction.
 fn gained(height: f32) -> f64 {
     let domain = Domain::closed([0; 3], [32, 12, 32]);
-    let drop = |p: Vec3| ((p[0] - 16.1).hypot(p[2] - 16.3) - 5.0).max(p[1] - height - 5.0);
+    let drop = |p: Vec3| (libm::hypotf(p[0] - 16.1, p[2] - 16.3) - 5.0).max(p[1] - height - 5.0);
     let (plate, still) = (|p: Vec3| p[1] - height, |_: f64, p: Vec3| p[1] - height);
     let mut surface = MarkedSurface::new(domain, 1, drop, 0, 1);
     surface.meet(&plate);
