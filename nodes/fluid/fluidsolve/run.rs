@@ -87,7 +87,7 @@ impl Chain for Run {
         let mut surface = start.surface.clone();
         let colliders = Colliders::at_start(cx, &domain, lattice)?;
         if !colliders.is_empty() {
-            surface.settle(&|point| colliders.distance(1.0, point));
+            surface.meet(&|point| colliders.distance(1.0, point));
         }
         let [velocity, spin] = [INITIAL_VELOCITY, INITIAL_SPIN].map(|param| cx.get(param).map(|x| x as f32));
         let density = |place: [f32; 3]| match colliders.distance(1.0, place) >= 0.0 {

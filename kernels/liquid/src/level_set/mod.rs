@@ -55,11 +55,6 @@ const SKIN: f32 = 0.25;
 /// liquid that rolls over it would never leave: drops that spread lost 4 % of their volume to it.
 const LAG: f32 = 0.25;
 
-/// Distance of a liquid's surface from a solid, in cells, up to which the liquid was meant to lie against it when it was placed;
-/// and height above the solid from which on other surfaces are as close as that.
-const AGAINST: f32 = 0.3;
-const CLEAR_OF: f32 = 1.5;
-
 /// Cells that a solid moves from which on it may leave behind what was the half of it that liquid is continued into.
 const PASSING: f32 = 0.5;
 
@@ -268,32 +263,6 @@ impl LevelSet {
     /// the grid cannot tell apart, a level pool stays level beside a slope, and liquid under an overhang ends there. In a
     /// thin solid each half has φ of its own side.
     pub fn meet(&mut self, solid: &Distance<'_>) {
-        self.meet_within(solid, LAG);
-    }
-
-    /// The same of liquid that was just placed: where it lies against a solid it has no surface, so that φ beside the solid is
-    /// that at a height to which a surface there is not the closest.
-    pub(crate) fn settle(&mut self, solid: &Distance<'_>) {
-        let (rows, phi) = (self.rows().clone(), std::mem::take(&mut self.phi));
-        let before = PhiView { rows: &rows, phi: &phi, ..self.view() };
-        let start = || PhiSampler::new(before);
-        let [phi] = rows.tabulate_with(start, |sampler, cell, n| {
-            let (at, own) = (cell.map(|x| x as f32 + 0.5), phi[n]);
-            let height = solid(at);
-            if !(-CONTACT..CLEAR_OF).contains(&height) {
-                return [own];
-            }
-            let Some(normal) = outward(solid, at) else { return [own] };
-            let up = |to: f32| add(at, scale(normal, to - height));
-            let lies_against = sampler.at(up(0.0)).abs() < AGAINST && solid(up(CLEAR_OF)) > 0.9 * CLEAR_OF;
-            let clear = if lies_against { sampler.at(up(CLEAR_OF)) } else { own };
-            [if clear < 0.0 { own.min(clear) } else { own }]
-        });
-        self.store(&rows, phi, 0);
-        self.meet_within(solid, 0.0);
-    }
-
-    fn meet_within(&mut self, solid: &Distance<'_>, lag: f32) {
         let (rows, phi) = (self.rows().clone(), std::mem::take(&mut self.phi));
         let before = PhiView { rows: &rows, phi: &phi, ..self.view() };
         let start = || PhiSampler::new(before);
@@ -303,7 +272,7 @@ impl LevelSet {
             let value = if depth > CONTACT {
                 own.max(depth - CONTACT)
             } else if depth >= 0.0 {
-                continued(solid, sampler, at, depth, (own, lag))
+                continued(solid, sampler, at, depth, own)
             } else if depth > -NEXT_TO && own > 0.0 && own < 1.0 {
                 parted(solid, sampler, at, -depth, own)
             } else {
@@ -389,8 +358,7 @@ impl LevelSet {
 }
 
 /// φ at a place in a solid, whose distance there is −`depth`, as the liquid outside goes on.
-/// `own`: φ there, and how much larger than that it may stay in the skin.
-fn continued(solid: &Distance<'_>, sampler: &mut PhiSampler<'_>, at: Vec3, depth: f32, (own, lag): (f32, f32)) -> f32 {
+fn continued(solid: &Distance<'_>, sampler: &mut PhiSampler<'_>, at: Vec3, depth: f32, own: f32) -> f32 {
     let Some(sides) = Sides::of(solid, at, depth) else { return own };
     let is_thin = sides.is_thin();
     let mut of_side = |Sides { normal, depth, .. }: Sides| {
@@ -406,7 +374,7 @@ fn continued(solid: &Distance<'_>, sampler: &mut PhiSampler<'_>, at: Vec3, depth
         // What is the liquid's own may be that of the other side.
         sides.joined([own_side, of_side(sides.other())])
     } else if depth < SKIN {
-        own.min(own_side + lag)
+        own.min(own_side + LAG)
     } else {
         own_side
     }

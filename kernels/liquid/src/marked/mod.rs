@@ -25,14 +25,6 @@ const INSIDE: f32 = 1.0;
 /// Cosine between the normals of a marker and of a thin solid from which it faces a side.
 const FACING: f32 = 0.5;
 
-/// Times that φ of liquid just placed beside a solid is continued into it: what continues changes once it is a distance again.
-const SETTLING: u32 = 2;
-
-/// Distance from a solid, in surface cells, up to which markers of liquid just placed may be on a side that lies against it, or
-/// at an edge of one; and from the surface, from which on they are.
-const BY_SOLID: f32 = 2.5;
-const ON_SIDE: f32 = 0.5;
-
 /// Thickness of a film on a solid, in surface cells, from which a mesh of these cells shows it without holes: more than the
 /// diagonal of a cell.
 const FILM: f32 = 1.8;
@@ -118,31 +110,6 @@ impl MarkedSurface {
     pub fn within(self, domain: &Domain) -> Self {
         let periods = domain.periods().refined(self.resolution);
         Self { periods, set: self.set.open_at(domain.open_sides()), ..self }
-    }
-
-    /// As [`Surface::meet`], of liquid that was just placed: where it lies against a solid it has neither a surface nor an edge,
-    /// so that a pool whose side ends at a solid is level there.
-    pub fn settle(&mut self, solid: &Distance<'_>) {
-        let size = self.resolution as f32;
-        let scaled = |point: Vec3| size * solid(scale(point, 1.0 / size));
-        for _ in 0..SETTLING {
-            self.set.settle(&scaled);
-            self.among_images(0.0, |_, set| set.fill());
-        }
-        let mut sampler = PhiSampler::new(self.set.view());
-        let mut place = |marker: &mut Marker| {
-            let (phi, gradient) = sampler.gradient(marker.point);
-            let Some(normal) = unit(gradient).filter(|_| phi.abs() < ON_SIDE) else { return false };
-            marker.point = sub(marker.point, scale(normal, phi));
-            let is_same_side = dot(normal, marker.normal) > 0.0;
-            marker.normal = normal;
-            is_same_side
-        };
-        let markers = &mut self.markers.markers;
-        let kept: Vec<bool> =
-            markers.iter_mut().map(|marker| scaled(marker.point) > BY_SOLID || place(marker)).collect();
-        self.markers.retain(|n| kept[n]);
-        self.meet(solid);
     }
 
     /// The level set, in surface cells.

@@ -139,22 +139,3 @@ fn a_block_slides_on_a_floor_that_cuts_cells() {
     let kept = volume(&liquid.surface().view(), &domain) / start;
     assert!((kept - 1.0).abs() < 0.05, "{kept}");
 }
-
-#[test]
-fn a_pool_that_ends_at_a_solid_rests() {
-    let domain = Domain::closed([0; 3], [16, 12, 8]);
-    for (end, most) in [(8.0, 5e-3), (8.3, 0.2), (7.6_f32, 5e-3)] {
-        let (block, wall) = (block([-1.0, -1.0, -1.0], [end, 6.0, 9.0]), |p: Vec3| end - p[0]);
-        let mut surface = MarkedSurface::new(domain, 1, block, 0, 1);
-        surface.settle(&wall);
-        let mut liquid = Liquid::new(LiquidSettings::new(domain, 0.05), surface);
-        let distance = |_: f64, p: Vec3| wall(p);
-        let around = Surroundings { solid: Some(Solid::still(&distance)), ..FALLING };
-        let mut speed = 0.0_f64;
-        for _ in 0..24 {
-            liquid.step_frame(&around, 1.0 / 24.0);
-            speed = speed.max(largest(&liquid) / (9.81 / 24.0));
-        }
-        assert!(speed < most, "a pool up to {end}: {speed}");
-    }
-}
