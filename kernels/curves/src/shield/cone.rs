@@ -13,13 +13,14 @@
 //! Front and back faces are counted separately. If each is at most one layer the larger mean is taken: exact. What
 //! layers behind one another add too much is taken off, to 0.03 (see [`super::layers`]).
 
+use super::cone_blocks::ConeBlocks;
 use super::layers::{Edge, Layers};
 use super::rays::{Seen, beside};
 use super::views::View;
 use super::{Fade, Obstacle, Reach};
 use numerics::lanes::{F32x16, LANES, Lanes, get};
 use numerics::simd::kernel;
-use numerics::tree::{Boxes, Region};
+use numerics::tree::Boxes;
 use numerics::trig;
 use numerics::vector::{self, Vec3, cross, sub};
 use std::f32::consts::PI;
@@ -71,7 +72,7 @@ fn body_with_fade(obstacles: &[Obstacle], views: &[View], fade: Fade, cone: f32,
 
 /// How much what is covered counts by its distance. A type and not an `Option`, so that without it nothing is computed:
 /// a branch within a loop over lanes computes both sides.
-trait DistanceWeight: Copy {
+pub(super) trait DistanceWeight: Copy {
     /// Beyond this distance nothing counts, of at most `end`.
     fn farthest(self, end: f32) -> f32;
 
@@ -110,15 +111,29 @@ impl DistanceWeight for Fade {
 #[inline(always)]
 fn body<W: DistanceWeight>(obstacles: &[Obstacle], views: &[View], fade: W, cone: f32, covered: &mut [f32]) {
     let (sine, cosine) = trig::sin_cos(cone);
+    let slope = sine / cosine;
+    let mut nearby = Vec::new();
+    for obstacle in obstacles {
+        let mut blocks = ConeBlocks::default();
+        blocks.gather(obstacle, views, slope, fade);
+        nearby.push(blocks);
+    }
+    let mut alone = ConeBlocks::default();
     let mut layers = Layers::default();
     for (view, covered) in views.iter().zip(covered) {
         layers.clear();
         let mut sums = [F32x16::splat(0.0); 2];
-        for obstacle in obstacles {
+        for (obstacle, shared) in obstacles.iter().zip(&nearby) {
             let gap = view.gap.at(obstacle.size);
             let farthest = fade.farthest(view.reach);
-            let cone = Cone { at: view.at, slope: sine / cosine, end: view.reach, fade, farthest, gap };
-            cone.look(obstacle, &mut sums, &mut layers);
+            let cone = Cone { at: view.at, slope, end: view.reach, fade, farthest, gap };
+            let blocks = if shared.are_all() {
+                shared
+            } else {
+                alone.gather(obstacle, std::slice::from_ref(view), slope, fade);
+                &alone
+            };
+            cone.look(obstacle, blocks, &mut sums, &mut layers);
         }
         let (mut front, mut back) = (0.0, 0.0);
         for lane in 0..LANES {
@@ -159,12 +174,31 @@ struct Cone<W> {
 impl<W: DistanceWeight> Cone<W> {
     /// Adds how many times the mesh covers the disc with front and with back faces, on average; spread over the lanes.
     #[inline(always)]
-    fn look(&self, obstacle: &Obstacle, sums: &mut [F32x16; 2], layers: &mut Layers) {
+    fn look(&self, obstacle: &Obstacle, nearby: &ConeBlocks, sums: &mut [F32x16; 2], layers: &mut Layers) {
         let Some(edges) = &obstacle.edges else { return };
-        let tree = &obstacle.tree;
-        for (block, lanes) in tree.walk(self) {
-            let (corners, thirds) = (&tree.blocks()[block].corners, edges.of_block(block));
-            self.add(&self.seen(corners), &self.seen(thirds), lanes, sums, layers);
+        for group in nearby.groups() {
+            let mut met = self.meeting(&group.boxes);
+            if met == 0 {
+                continue;
+            }
+            let [one_sided, beside] = group.facings.seen_from(&group.boxes, self.at, self.gap, ASIDE[0] * self.slope);
+            met &= !(one_sided & beside);
+            while met != 0 {
+                let lane = met.trailing_zeros() as usize;
+                met &= met - 1;
+                let index = group.blocks[lane] as usize;
+                let block = &obstacle.tree.blocks()[index];
+                let lanes = self.meeting(&block.boxes()) & block.filled();
+                if lanes == 0 {
+                    continue;
+                }
+                let corners = self.seen(&block.corners);
+                if one_sided >> lane & 1 == 1 {
+                    self.add_centre(&corners, lanes, sums, layers);
+                } else {
+                    self.add(&corners, &self.seen(edges.of_block(index)), lanes, sums, layers);
+                }
+            }
         }
     }
 
@@ -217,11 +251,7 @@ impl<W: DistanceWeight> Cone<W> {
                 open[side][lane] = counts & !continues;
             }
         }
-        while at_centre != 0 {
-            let lane = at_centre.trailing_zeros() as usize;
-            at_centre &= at_centre - 1;
-            layers.add_centre(front[lane], count.0[lane]);
-        }
+        add_centres(at_centre, &front, &count, layers);
         for side in 0..3 {
             let mut any = false;
             for lane in 0..LANES {
@@ -250,10 +280,27 @@ impl<W: DistanceWeight> Cone<W> {
                 }
             }
         }
+        add_counts(&front, &count, sums);
+    }
+
+    /// Adds sixteen triangles that count and have no open sides.
+    #[inline(always)]
+    fn add_centre(&self, corners: &[Lanes<3>; 3], lanes: u16, sums: &mut [F32x16; 2], layers: &mut Layers) {
+        let mut count = F32x16::splat(0.0);
+        let (mut front, mut at_centre) = ([false; LANES], 0);
         for lane in 0..LANES {
-            let (to_front, to_back) = if front[lane] { (count.0[lane], 0.0) } else { (0.0, count.0[lane]) };
-            sums[0].0[lane] += to_front;
-            sums[1].0[lane] += to_back;
+            let [a, b, c] = [get(&corners[0], lane), get(&corners[1], lane), get(&corners[2], lane)];
+            let seen = Seen::from([a, b, c]);
+            front[lane] = seen.volume > 0.0;
+            let [x, y, z] = [is_left(a, b), is_left(b, c), is_left(c, a)];
+            let inside = ((x & y & z) | !(x | y | z)) & (seen.towards > 0.0) & (lanes >> lane & 1 == 1);
+            let weight = self.weight(seen.towards / seen.across);
+            count.0[lane] = if inside { weight } else { 0.0 };
+            at_centre |= u16::from(inside) << lane;
+        }
+        if at_centre != 0 {
+            add_centres(at_centre, &front, &count, layers);
+            add_counts(&front, &count, sums);
         }
     }
 
@@ -332,7 +379,8 @@ impl<W: DistanceWeight> Cone<W> {
     }
 }
 
-impl<W> Region for &Cone<W> {
+impl<W> Cone<W> {
+    /// A bit for each lane whose box meets the cone.
     #[inline(always)]
     fn meeting(&self, boxes: &Boxes) -> u16 {
         let mut mask = 0;
@@ -353,6 +401,26 @@ impl<W> Region for &Cone<W> {
             mask |= u16::from(meets) << lane;
         }
         mask
+    }
+}
+
+/// Adds the layers that triangles are at the centre of the disc.
+#[inline(always)]
+fn add_centres(mut at_centre: u16, front: &[bool; LANES], count: &F32x16, layers: &mut Layers) {
+    while at_centre != 0 {
+        let lane = at_centre.trailing_zeros() as usize;
+        at_centre &= at_centre - 1;
+        layers.add_centre(front[lane], count.0[lane]);
+    }
+}
+
+/// Adds what each triangle counts to the sum of front or of back faces.
+#[inline(always)]
+fn add_counts(front: &[bool; LANES], count: &F32x16, sums: &mut [F32x16; 2]) {
+    for lane in 0..LANES {
+        let (to_front, to_back) = if front[lane] { (count.0[lane], 0.0) } else { (0.0, count.0[lane]) };
+        sums[0].0[lane] += to_front;
+        sums[1].0[lane] += to_back;
     }
 }
 

@@ -1,14 +1,22 @@
 //! Neighbouring triangles: for each block of a tree, the third corner of the neighbour across each side.
 
+use super::facing::{Facing, write_facings};
 use numerics::lanes::{F32x16, Lanes, set};
 use numerics::parallel;
+use numerics::simd::Path;
 use numerics::tree::{Block, NONE, TriangleTree};
 use numerics::vector::Vec3;
 use rayon::slice::ParallelSliceMut;
 
-/// Third corners of neighbours, one entry for each block of the tree. Side k runs from corner k to the next; a side
-/// without a neighbour has its own first corner instead, which makes a triangle without area.
-pub(super) struct Edges(Vec<[Lanes<3>; 3]>);
+/// Third corners of the neighbours of a block's triangles. Side k runs from corner k to the next; a side without a neighbour has
+/// its own first corner instead, which makes a triangle without area.
+pub(super) type Thirds = [Lanes<3>; 3];
+
+/// The neighbours of the triangles of a tree, one entry for each block.
+pub(super) struct Edges {
+    thirds: Vec<Thirds>,
+    facings: Vec<Facing>,
+}
 
 /// Number of blocks in a task: some 20 µs of work.
 const TASK: usize = 128;
@@ -51,14 +59,39 @@ impl Edges {
             }
             third
         };
-        let mut edges = vec![[[F32x16::splat(0.0); 3]; 3]; tree.blocks().len()];
-        parallel::fill(&mut edges, TASK, |block| of_block(&tree.blocks()[block]));
-        Self(edges)
+        let (path, blocks) = (Path::chosen(), tree.blocks());
+        let mut edges = Self {
+            thirds: vec![[[F32x16::splat(0.0); 3]; 3]; blocks.len()],
+            facings: vec![Facing::default(); blocks.len()],
+        };
+        let tasks = edges.thirds.chunks_mut(TASK).zip(edges.facings.chunks_mut(TASK)).zip(blocks.chunks(TASK));
+        parallel::for_each(tasks, |_, ((thirds, facings), blocks)| {
+            for (thirds, block) in thirds.iter_mut().zip(blocks) {
+                *thirds = of_block(block);
+            }
+            write_facings(path, blocks, thirds, facings);
+        });
+        edges
     }
 
     #[inline(always)]
-    pub(super) fn of_block(&self, block: usize) -> &[Lanes<3>; 3] {
-        &self.0[block]
+    pub(super) fn of_block(&self, block: usize) -> &Thirds {
+        &self.thirds[block]
+    }
+
+    /// The same without knowing from where any block is seen from one side.
+    #[cfg(test)]
+    pub(super) fn without_facings(mut self) -> Self {
+        for facing in &mut self.facings {
+            *facing = facing.forgotten();
+        }
+        self
+    }
+
+    /// From where the triangles of a block are seen from one side.
+    #[inline(always)]
+    pub(super) fn facing(&self, block: usize) -> &Facing {
+        &self.facings[block]
     }
 }
 

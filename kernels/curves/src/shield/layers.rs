@@ -85,29 +85,34 @@ impl Layers {
         if !self.0.iter().any(overlap) {
             return larger(means);
         }
-        let [front, back] = [self.0[0].parts(), self.0[1].parts()];
+        // No closures within the loops: they are not compiled for the kernel's path.
+        let sides = [self.0[0].parts(), self.0[1].parts()];
         let mut both = F32x16::splat(0.0);
         let (mut too_much, mut alone) = ([F32x16::splat(0.0); 2], [F32x16::splat(0.0); 2]);
         for part in 0..PARTS {
-            for lane in 0..LANES {
-                let seen = [&front, &back].map(|side| (nearest(side, part, lane), side[1][part].0[lane]));
-                both.0[lane] += if seen[0].0 > seen[1].0 { seen[0].0 } else { seen[1].0 };
-                for (side, (covered, sum)) in seen.into_iter().enumerate() {
+            let mut seen = [F32x16::splat(0.0); 2];
+            for side in 0..2 {
+                for lane in 0..LANES {
+                    let covered = nearest(&sides[side], part, lane);
+                    seen[side].0[lane] = covered;
                     alone[side].0[lane] += covered;
-                    too_much[side].0[lane] += sum - covered;
+                    too_much[side].0[lane] += sides[side][1][part].0[lane] - covered;
                 }
             }
+            for lane in 0..LANES {
+                let (front, back) = (seen[0].0[lane], seen[1].0[lane]);
+                both.0[lane] += if front > back { front } else { back };
+            }
         }
-        let [both, front_alone, back_alone] = [both, alone[0], alone[1]].map(mean);
-        let [front, back] = too_much.map(mean);
-        larger([means[0] - front, means[1] - back]) + (both - larger([front_alone, back_alone]))
+        let alone = larger([mean(&alone[0]), mean(&alone[1])]);
+        larger([means[0] - mean(&too_much[0]), means[1] - mean(&too_much[1])]) + (mean(&both) - alone)
     }
 }
 
 /// The share of a part of the disc on a ray that is covered, times the weight of its nearest layer.
 #[inline(always)]
 fn nearest(sums: &Sums<[F32x16; PARTS]>, part: usize, lane: usize) -> f32 {
-    let [count, _, powers] = [0, 1, 2].map(|sum| sums[sum][part].0[lane]);
+    let (count, powers) = (sums[0][part].0[lane], sums[2][part].0[lane]);
     let share = if count < 1.0 { count } else { 1.0 };
     let power = powers / share;
     // Not if either is 0, or rounded to less.
@@ -117,7 +122,7 @@ fn nearest(sums: &Sums<[F32x16; PARTS]>, part: usize, lane: usize) -> f32 {
 }
 
 #[inline(always)]
-fn mean(sums: F32x16) -> f32 {
+fn mean(sums: &F32x16) -> f32 {
     sums.0.iter().sum::<f32>() / (LANES * PARTS) as f32
 }
 
@@ -133,7 +138,8 @@ impl Side {
     /// Mean sums over the parts of each ray.
     #[inline(always)]
     fn parts(&self) -> Sums<[F32x16; PARTS]> {
-        let mut sums = self.at_centre.map(|sum| [F32x16::splat(sum); PARTS]);
+        let [count, weight, powers] = self.at_centre;
+        let mut sums = [[F32x16::splat(count); PARTS], [F32x16::splat(weight); PARTS], [F32x16::splat(powers); PARTS]];
         for Edge { from: [ax, ay], to: [bx, by], change, weight } in &self.edges {
             let terms = terms(*weight);
             let (mut square, mut changes) = (F32x16::splat(0.0), F32x16::splat(0.0));

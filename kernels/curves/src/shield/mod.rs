@@ -15,7 +15,9 @@
 //! skin, at any angle of the wind. Limit: a root buried deeper than the gap is covered by the skin above it.
 
 mod cone;
+mod cone_blocks;
 mod edges;
+mod facing;
 mod frame;
 mod layers;
 mod rays;
