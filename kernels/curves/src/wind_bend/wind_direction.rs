@@ -4,7 +4,7 @@ use super::curve_group::{CurveGroup, Curves, Unit};
 use super::share::gather;
 use super::{Bend, BendNoise};
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
-use numerics::vector;
+use numerics::vector::{self, Vec3};
 
 /// Largest amplitude: the wind's own part is then below rounding, and squares are still far from overflow.
 const LARGEST: f32 = 1e12;
@@ -29,19 +29,16 @@ impl<'a> WindDirection<'a> {
         if let Some(noise) = noise {
             let at = curves.at(0);
             let last = group.starts.len() - 2;
-            let other = match noise.other {
-                Some((origin, _)) => origin,
-                None => noise.origin,
-            };
+            let mut own = [[0.0; 3]; LANES];
             for lane in 0..LANES {
-                let root = match noise.roots {
+                own[lane] = match noise.roots {
                     Some(roots) => roots[group.first + lane.min(last)],
                     None => group.points[at[lane]],
                 };
-                for axis in 0..3 {
-                    roots[0][axis][lane] = f64::from(root[axis]) + noise.origin[axis];
-                    roots[1][axis][lane] = f64::from(root[axis]) + other[axis];
-                }
+            }
+            place_roots(&own, &noise.origin, &mut roots[0]);
+            if let Some((origin, _)) = &noise.other {
+                place_roots(&own, origin, &mut roots[1]);
             }
         }
         Self { wind: bend.wind, noise, gusts: bend.gusts, roots, unit: &unit.from }
@@ -63,24 +60,24 @@ impl<'a> WindDirection<'a> {
         }
         if let Some(noise) = self.noise {
             let field = self.field(noise, arc, at);
-            let factors = gather(noise.amplitude.mask, at);
+            let amplitudes = amplitudes(noise, at);
             for lane in 0..LANES {
-                let amplitude = (noise.amplitude.value * factors.0[lane]).clamp(-LARGEST, LARGEST);
-                // Infinity times 0 is NaN and counts as 0.
-                let amplitude = if amplitude.is_nan() { 0.0 } else { amplitude };
-                let gust = vector::scale(get(&field, lane), amplitude);
+                let gust = vector::scale(get(&field, lane), amplitudes.0[lane]);
                 let sum = vector::add(get(&towards, lane), gust);
                 set(&mut towards, lane, sum);
             }
         }
-        for lane in 0..LANES {
-            let mut sum = get(&towards, lane);
-            if let Some(gusts) = self.gusts {
+        if let Some(gusts) = self.gusts {
+            for lane in 0..LANES {
+                let gust = gusts[at[lane]];
                 for axis in 0..3 {
-                    let gust = gusts[at[lane]][axis];
-                    sum[axis] += if gust.is_nan() { 0.0 } else { gust.clamp(-LARGEST, LARGEST) };
+                    let gust = if gust[axis].is_nan() { 0.0 } else { gust[axis].clamp(-LARGEST, LARGEST) };
+                    towards[axis].0[lane] += gust;
                 }
             }
+        }
+        for lane in 0..LANES {
+            let sum = get(&towards, lane);
             let unit = vector::power_of_two_to_one(vector::largest(sum)).0;
             set(&mut towards, lane, vector::scale(sum, unit));
         }
@@ -90,7 +87,7 @@ impl<'a> WindDirection<'a> {
     /// The value of the noise at CVs.
     #[inline(always)]
     fn field(&self, noise: &BendNoise<'_>, arc: &F32x16, at: &[usize; LANES]) -> Lanes<3> {
-        let waves = gather(noise.waviness.mask, at);
+        let downwind = self.downwind(noise, arc, at);
         let (parts, weights) = match noise.other {
             Some((_, share)) => {
                 let whole = ((1.0 - share) * (1.0 - share) + share * share).sqrt();
@@ -103,12 +100,13 @@ impl<'a> WindDirection<'a> {
             let mut points = [[0.0; LANES]; 3];
             for axis in 0..3 {
                 for lane in 0..LANES {
-                    let along = f64::from(self.wind[axis]) * f64::from(noise.waviness.value * waves.0[lane]);
-                    let displacement = f64::from(arc.0[lane]) * f64::from(self.unit.0[lane]) * along;
-                    points[axis][lane] = (self.roots[part][axis][lane] + displacement) * noise.frequency;
+                    points[axis][lane] = (self.roots[part][axis][lane] + downwind[axis][lane]) * noise.frequency;
                 }
             }
             let own = noise.field.at_lanes(&points);
+            if parts == 1 {
+                return own;
+            }
             for axis in 0..3 {
                 for lane in 0..LANES {
                     let weighted = weights[part] * own[axis].0[lane];
@@ -119,4 +117,60 @@ impl<'a> WindDirection<'a> {
         }
         field
     }
+
+    /// By how much CVs sample the noise downwind of their roots, in metres along each axis.
+    #[inline(always)]
+    fn downwind(&self, noise: &BendNoise<'_>, arc: &F32x16, at: &[usize; LANES]) -> [[f64; LANES]; 3] {
+        let mut lengths = [0.0; LANES];
+        for lane in 0..LANES {
+            lengths[lane] = f64::from(arc.0[lane]) * f64::from(self.unit.0[lane]);
+        }
+        let mut displacements = [[0.0; LANES]; 3];
+        if noise.waviness.mask.is_none() {
+            // Products that are the same on all lanes.
+            for axis in 0..3 {
+                let along = f64::from(self.wind[axis]) * f64::from(noise.waviness.value);
+                for lane in 0..LANES {
+                    displacements[axis][lane] = lengths[lane] * along;
+                }
+            }
+            return displacements;
+        }
+        let waves = gather(noise.waviness.mask, at);
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                let along = f64::from(self.wind[axis]) * f64::from(noise.waviness.value * waves.0[lane]);
+                displacements[axis][lane] = lengths[lane] * along;
+            }
+        }
+        displacements
+    }
+}
+
+/// Where roots sample the noise.
+#[inline(always)]
+fn place_roots(roots: &[Vec3; LANES], origin: &[f64; 3], placed: &mut [[f64; LANES]; 3]) {
+    for axis in 0..3 {
+        for lane in 0..LANES {
+            placed[axis][lane] = f64::from(roots[lane][axis]) + origin[axis];
+        }
+    }
+}
+
+/// The noise's amplitude at CVs.
+#[inline(always)]
+fn amplitudes(noise: &BendNoise<'_>, at: &[usize; LANES]) -> F32x16 {
+    let Some(mask) = noise.amplitude.mask else { return F32x16::splat(amplitude(noise.amplitude.value)) };
+    let mut amplitudes = F32x16::splat(0.0);
+    for lane in 0..LANES {
+        amplitudes.0[lane] = amplitude(noise.amplitude.value * mask[at[lane]]);
+    }
+    amplitudes
+}
+
+/// A product as an amplitude; infinity times 0 is NaN and counts as 0.
+#[inline(always)]
+fn amplitude(product: f32) -> f32 {
+    let amplitude = product.clamp(-LARGEST, LARGEST);
+    if amplitude.is_nan() { 0.0 } else { amplitude }
 }
