@@ -77,7 +77,7 @@ pub(super) struct KnownResponses {
 }
 
 /// Log₂ of the number of responses that are kept.
-const KNOWN_BITS: u32 = 7;
+const KNOWN_BITS: u32 = 9;
 
 impl KnownResponses {
     pub(super) fn new(drag: Drag) -> Self {

@@ -2,6 +2,7 @@
 //! power-of-two unit in which all coordinates are below 2.
 
 use super::Collider;
+use numerics::lanes::{F64x16, LANES, Lanes};
 use numerics::vector::{self, DVec3, Vec3, direction, to_f32, to_f64};
 
 /// The map from the scene to the frame.
@@ -64,12 +65,35 @@ impl Frame {
         [a.dot(&from_centre) as f32, b.dot(&from_centre) as f32, c.dot(&from_centre) as f32]
     }
 
+    /// Points of the scene in the frame, each as [`Frame::at`] gives it.
+    #[inline(always)]
+    pub(super) fn at_lanes(&self, points: &Lanes<3>) -> Lanes<3> {
+        let mut from_centre = [F64x16::ZERO; 3];
+        for axis in 0..3 {
+            for lane in 0..LANES {
+                from_centre[axis].0[lane] = f64::from(points[axis].0[lane]) - self.centre[axis];
+            }
+        }
+        let [x, y, z] = &from_centre;
+        let mut out = *points;
+        for axis in 0..3 {
+            let along = &self.axes[axis];
+            for lane in 0..LANES {
+                let sum = along.x * x.0[lane] + along.y * y.0[lane] + along.z * z.0[lane];
+                out[axis].0[lane] = sum as f32;
+            }
+        }
+        out
+    }
+
     /// A length of the scene in the frame.
+    #[inline(always)]
     pub(super) fn length(&self, metres: f32) -> f32 {
         (f64::from(metres) * self.unit) as f32
     }
 
     /// The gap for the CVs of a curve.
+    #[inline(always)]
     pub(super) fn gap(&self, cvs: &[Vec3], asked: f32) -> Gap {
         let Bounds { low, high } = Bounds::of(cvs);
         let size = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f32::max);
@@ -89,6 +113,7 @@ struct Bounds {
 
 impl Bounds {
     /// Bounds of the points, coordinates that are not finite ignored.
+    #[inline(always)]
     fn of(points: &[Vec3]) -> Self {
         let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
         for point in points {

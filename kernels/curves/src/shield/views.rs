@@ -5,7 +5,8 @@
 
 use super::Shield;
 use super::frame::{Frame, Gap};
-use numerics::lanes::LANES;
+use numerics::lanes::{F32x16, LANES, get, set};
+use numerics::masked::Masked;
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
 use numerics::vector::Vec3;
@@ -54,19 +55,9 @@ impl Views {
         let still = View { at: [0.0; 3], gap: Gap::default(), reach: 0.0 };
         let mut views = vec![still; points.len()];
         let tasks = split(&mut views, &starts);
-        let bounds = parallel::map(tasks, |_, (curves, mut views)| {
-            let mut bounds = Bounds::NONE;
-            for ends in curves.windows(2) {
-                let cvs = &points[ends[0] as usize..ends[1] as usize];
-                let gap = frame.gap(cvs, shield.skin_gap);
-                let (mine, rest) = views.split_at_mut(cvs.len());
-                for ((view, cv), row) in mine.iter_mut().zip(cvs).zip((base + ends[0]) as usize..) {
-                    *view = View { at: frame.at(*cv), gap, reach: frame.length(shield.offset.at(row)) };
-                    bounds.add(view.at);
-                }
-                views = rest;
-            }
-            bounds
+        let path = Path::chosen();
+        let bounds = parallel::map(tasks, |_, (curves, views)| {
+            write_views(path, frame, curves, &points[curves[0] as usize..], shield, (base + curves[0]) as usize, views)
         });
         let bounds = bounds.iter().fold(Bounds::NONE, Bounds::and);
         let (sorted, order) = sorted(&views, &bounds);
@@ -161,14 +152,6 @@ impl Bounds {
     const NONE: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
 
     #[inline]
-    fn add(&mut self, at: Vec3) {
-        for axis in 0..3 {
-            let x = at[axis];
-            self.low[axis] = if x < self.low[axis] { x } else { self.low[axis] };
-            self.high[axis] = if x > self.high[axis] { x } else { self.high[axis] };
-        }
-    }
-
     fn and(self, other: &Self) -> Self {
         Self {
             low: [0, 1, 2].map(|axis| self.low[axis].min(other.low[axis])),
@@ -203,9 +186,67 @@ impl Grid {
     /// The layer of a point, and its cell in there; any for NaN.
     #[inline(always)]
     fn cell(&self, at: Vec3) -> [u32; 3] {
-        let along = |axis: usize| ((at[axis] - self.low[axis]) * self.fine[axis]).clamp(0.0, self.last) as u32;
+        // A signed number is converted in fewer instructions.
+        let along = |axis: usize| ((at[axis] - self.low[axis]) * self.fine[axis]).clamp(0.0, self.last) as i32 as u32;
         [along(0), along(1), u32::from(at[2] > self.middle)]
     }
+}
+
+kernel! {
+    /// Writes the views of curves, whose first CV is the first of `points` and row `row` of a mask; returns their bounds.
+    fn write_views(
+        frame: &Frame,
+        curves: &[u32],
+        points: &[Vec3],
+        shield: &Shield<'_>,
+        row: usize,
+        views: &mut [View],
+    ) -> Bounds = write_views_body;
+}
+
+#[inline(always)]
+fn write_views_body(
+    frame: &Frame,
+    curves: &[u32],
+    points: &[Vec3],
+    shield: &Shield<'_>,
+    row: usize,
+    views: &mut [View],
+) -> Bounds {
+    let reach = frame.length(Masked::uniform(shield.offset.value).at(0));
+    let (mut low, mut high) = ([F32x16::splat(f32::INFINITY); 3], [F32x16::splat(f32::NEG_INFINITY); 3]);
+    for (views, points) in views.chunks_mut(LANES).zip(points.chunks(LANES)) {
+        // A lane without a CV repeats the first.
+        let mut at = points[0].map(F32x16::splat);
+        for lane in 0..views.len() {
+            set(&mut at, lane, points[lane]);
+        }
+        let at = frame.at_lanes(&at);
+        for axis in 0..3 {
+            low[axis] = at[axis].least(&low[axis]);
+            high[axis] = at[axis].most(&high[axis]);
+        }
+        for lane in 0..views.len() {
+            (views[lane].at, views[lane].reach) = (get(&at, lane), reach);
+        }
+    }
+    if shield.offset.mask.is_some() {
+        for k in 0..views.len() {
+            views[k].reach = frame.length(shield.offset.at(row + k));
+        }
+    }
+    for k in 1..curves.len() {
+        let cvs = (curves[k - 1] - curves[0]) as usize..(curves[k] - curves[0]) as usize;
+        let gap = frame.gap(&points[cvs.clone()], shield.skin_gap);
+        for view in &mut views[cvs] {
+            view.gap = gap;
+        }
+    }
+    let mut bounds = Bounds::NONE;
+    for lane in 0..LANES {
+        bounds = bounds.and(&Bounds { low: get(&low, lane), high: get(&high, lane) });
+    }
+    bounds
 }
 
 kernel! {
@@ -216,14 +257,14 @@ kernel! {
 #[inline(always)]
 fn write_cells_body(views: &[View], grid: &Grid, cells: &mut [u32]) {
     for (views, cells) in views.chunks(LANES).zip(cells.chunks_mut(LANES)) {
-        let mut at = [[0; LANES]; 3];
+        let mut at = [F32x16::splat(0.0); 3];
         for lane in 0..views.len() {
-            let cell = grid.cell(views[lane].at);
-            for axis in 0..3 {
-                at[axis][lane] = cell[axis];
-            }
+            set(&mut at, lane, views[lane].at);
         }
-        let [x, y, layer] = at;
+        let (mut x, mut y, mut layer) = ([0; LANES], [0; LANES], [0; LANES]);
+        for lane in 0..LANES {
+            [x[lane], y[lane], layer[lane]] = grid.cell(get(&at, lane));
+        }
         let along = hilbert(x, y, grid.bits);
         for lane in 0..cells.len() {
             cells[lane] = along[lane] + (layer[lane] << (2 * grid.bits));
@@ -266,8 +307,8 @@ mod tests {
         let found: Vec<Vec3> = (0..views.curves()).flat_map(|curve| views.of_curve(curve)).map(at).collect();
         assert_eq!(found, points.iter().map(|point| frame.at(*point)).collect::<Vec<_>>());
         let cells: Vec<u32> = {
-            let mut bounds = Bounds::NONE;
-            views.views.iter().for_each(|view| bounds.add(view.at));
+            let of_view = |view: &View| Bounds { low: view.at, high: view.at };
+            let bounds = views.views.iter().fold(Bounds::NONE, |bounds, view| bounds.and(&of_view(view)));
             let grid = Grid::around(&bounds, 1);
             let sorted: Vec<View> = views.sorted().iter().map(|cv| views.views[*cv as usize]).collect();
             let mut cells = vec![0; sorted.len()];
