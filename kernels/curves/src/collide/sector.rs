@@ -75,29 +75,43 @@ impl Sector {
     /// What the triangle does to a turn to the direction `until`; may leave out where it stops no turn before that.
     #[inline(always)]
     pub(super) fn obstruction(&self, until: P2, corners: &[DVec3; 3]) -> Obstruction {
-        // A point at radius r that lies `back` beyond the ray at angle α is past α by asin(back/r) ≥ back/r.
-        let over = |p: P2| until[0] * p[1] - until[1] * p[0] >= self.back;
-        let counts = |p: P2, q: P2| match [p[1] < 0.0, q[1] < 0.0] {
-            [true, true] => false,
-            [false, false] => !(over(p) && over(q)),
-            // A piece from behind to the front passes the start or, on its left, the opposite direction.
-            [true, false] => p[0] * q[1] >= q[0] * p[1] || !over(q),
-            [false, true] => q[0] * p[1] >= p[0] * q[1] || !over(p),
-        };
         if let Some(length) = self.capsule {
             return self.capsule_obstruction(length, corners);
         }
         let mut found = Obstruction::default();
         if self.half == 0.0 {
-            self.pieces(corners, |p, q| {
-                if counts(p, q) {
-                    found.add_piece(p, q, self.back);
-                }
-            });
+            let Some(piece) = slice(&self.heights(corners), 0.0, |k| self.flat(&corners[k])) else { return found };
+            if self.inner > 0.0 {
+                self.within_reach(piece, |p, q| found.add_before(self, p, q, until));
+                return found;
+            }
+            // No closure here: it is not compiled for a kernel's path.
+            let Some(part) = inside_circle(piece[0], piece[1], self.reach) else { return found };
+            let [p, q] = part_of(piece, part);
+            found.add_before(self, p, q, until);
         } else {
             self.blocked_by(corners, |blocked| found.add(&blocked, self.back));
         }
         found
+    }
+
+    /// Whether a piece between two points may stop a turn to the direction `until`.
+    #[inline(always)]
+    fn may_stop(&self, p: P2, q: P2, until: P2) -> bool {
+        match [p[1] < 0.0, q[1] < 0.0] {
+            [true, true] => false,
+            [false, false] => !(self.is_beyond(p, until) && self.is_beyond(q, until)),
+            // A piece from behind to the front passes the start or, on its left, the opposite direction.
+            [true, false] => p[0] * q[1] >= q[0] * p[1] || !self.is_beyond(q, until),
+            [false, true] => q[0] * p[1] >= p[0] * q[1] || !self.is_beyond(p, until),
+        }
+    }
+
+    /// Whether a point lies `back` beyond the ray in the direction `until`: at radius r it is past that by
+    /// asin(back/r) ≥ back/r.
+    #[inline(always)]
+    fn is_beyond(&self, p: P2, until: P2) -> bool {
+        until[0] * p[1] - until[1] * p[0] >= self.back
     }
 
     /// Calls `found` with each interval of angles that the triangle blocks.
@@ -197,7 +211,8 @@ impl Sector {
     /// Calls `found` with the ends of each part of a straight piece inside the circle of `reach` and outside that of
     /// `inner`.
     #[inline(always)]
-    fn within_reach(&self, [p, q]: [P2; 2], mut found: impl FnMut(P2, P2)) {
+    fn within_reach(&self, piece: [P2; 2], mut found: impl FnMut(P2, P2)) {
+        let [p, q] = piece;
         let Some([from, to]) = inside_circle(p, q, self.reach) else { return };
         let skipped = if self.inner > 0.0 { inside_circle(p, q, self.inner) } else { None };
         let parts = match skipped {
@@ -210,11 +225,18 @@ impl Sector {
         // One call for both: a closure called from several places is not compiled for a kernel's path.
         for [from, to] in parts {
             if from <= to {
-                let at = |t: f64| [p[0] + t * (q[0] - p[0]), p[1] + t * (q[1] - p[1])];
-                found(at(from), at(to));
+                let [p, q] = part_of(piece, [from, to]);
+                found(p, q);
             }
         }
     }
+}
+
+/// The ends of a part of a straight piece, 0…1.
+#[inline(always)]
+fn part_of([p, q]: [P2; 2], [from, to]: [f64; 2]) -> [P2; 2] {
+    let side = [q[0] - p[0], q[1] - p[1]];
+    [[p[0] + from * side[0], p[1] + from * side[1]], [p[0] + to * side[0], p[1] + to * side[1]]]
 }
 
 impl Blocked {
@@ -251,6 +273,14 @@ impl Blocked {
 }
 
 impl Obstruction {
+    /// Adds the piece between two points in the plane of a sector if it may stop a turn to the direction `until`.
+    #[inline(always)]
+    fn add_before(&mut self, sector: &Sector, p: P2, q: P2, until: P2) {
+        if sector.may_stop(p, q, until) {
+            self.add_piece(p, q, sector.back);
+        }
+    }
+
     /// Adds the piece between two points, neither at the pivot: as [`Obstruction::add`] of [`Blocked::between`], but finds
     /// only the angles that count.
     #[inline(always)]

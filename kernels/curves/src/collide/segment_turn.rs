@@ -334,12 +334,15 @@ enum Stop {
     Stuck,
 }
 
+/// Sine of an angle above which rounding does not decide which of two directions a turn comes to first.
+const CLEARLY_APART: f64 = 1e-8;
+
 /// How far the sector may turn towards the unit vector `to` in its plane. Removes from `nearby` what it cannot meet.
 #[inline(always)]
 fn first_stop(sector: &Sector, to: &DVec3, nearby: &mut Nearby<'_>) -> Stop {
     let mut until = [sector.u.dot(to), sector.v.dot(to).max(0.0)];
     let mut wedge = None;
-    // The angle of `to` is needed where something is met.
+    // The angle of `to` is needed where something is met near it.
     let (mut stop, mut whole, mut clear): (Option<f64>, Option<f64>, bool) = (None, None, true);
     for (block, near) in &mut nearby.blocks {
         *near = within(&mut wedge, sector, until, block, *near);
@@ -353,15 +356,22 @@ fn first_stop(sector: &Sector, to: &DVec3, nearby: &mut Nearby<'_>) -> Stop {
                 return Stop::Stuck;
             }
             let Some(next) = found.stop else { continue };
-            let most = match stop {
-                Some(stop) => stop,
-                None => *whole.get_or_insert_with(|| sector.angle_of(to)),
-            };
-            if next >= most {
+            if stop.is_some_and(|stop| next >= stop) {
                 continue;
             }
-            stop = Some(next);
             let (sine, cosine) = libm::sincos(next);
+            if stop.is_none() {
+                // The sine of the angle from there to `to`: both lie in 0…π.
+                let left = until[1] * cosine - until[0] * sine;
+                let is_before = match left.abs() > CLEARLY_APART {
+                    true => left > 0.0,
+                    false => next < *whole.get_or_insert_with(|| sector.angle_of(to)),
+                };
+                if !is_before {
+                    continue;
+                }
+            }
+            stop = Some(next);
             until = [cosine, sine];
             wedge = None;
             lanes = within(&mut wedge, sector, until, block, lanes);
