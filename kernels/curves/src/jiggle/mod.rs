@@ -28,7 +28,7 @@ use numerics::parallel;
 use numerics::ramp::Ramp;
 use numerics::simd::Path;
 use numerics::vector::{DVec3, Vec3, to_f64};
-use response::{KnownResponses, Response};
+use response::Response;
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -245,23 +245,22 @@ impl Jiggle {
         let along = &self.along;
         let factor =
             |number: &Masked<'_, f64>, cv: usize| f64::from(number.factor(cv).clamp(MASK_RANGE[0], MASK_RANGE[1]));
-        let response = |cv: usize, known: &mut KnownResponses| {
+        let response = |cv: usize| {
             let softness = f64::from(spring.softness.eval(along[cv]));
             if softness > 0.0 {
                 let frequency = spring.frequency.value * factor(&spring.frequency, cv);
                 let zeta = spring.damping.value * factor(&spring.damping, cv);
-                known.response(2.0 * PI * frequency / softness * dt, zeta)
+                Response::new(2.0 * PI * frequency / softness * dt, zeta, spring.drag)
             } else {
                 Response::RIGID
             }
         };
         parallel::for_each(&mut self.batches, |_, batch| {
-            let mut known = KnownResponses::new(spring.drag);
             let steps = batch.groups.iter().flat_map(|curves| (0..curves.longest).map(move |step| (curves, step)));
             for ((curves, step), responses) in steps.zip(&mut batch.responses) {
                 for (lane, cv) in curves.at(step).into_iter().enumerate() {
                     // The root follows exactly, whatever the value of the ramp there.
-                    responses.set(lane, if step == 0 { Response::RIGID } else { response(cv, &mut known) });
+                    responses.set(lane, if step == 0 { Response::RIGID } else { response(cv) });
                 }
             }
         });

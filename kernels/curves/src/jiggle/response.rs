@@ -69,36 +69,6 @@ impl Response {
     }
 }
 
-/// Responses that were computed lately: CVs at the same fraction of their curves often have the same.
-pub(super) struct KnownResponses {
-    drag: Drag,
-    /// By a hash of phase and damping ratio: these, and their response.
-    entries: [(f64, f64, Response); 1 << KNOWN_BITS],
-}
-
-/// Log₂ of the number of responses that are kept.
-const KNOWN_BITS: u32 = 9;
-
-impl KnownResponses {
-    pub(super) fn new(drag: Drag) -> Self {
-        // NaN equals no number.
-        Self { drag, entries: [(f64::NAN, f64::NAN, Response::RIGID); 1 << KNOWN_BITS] }
-    }
-
-    /// As [`Response::new`].
-    pub(super) fn response(&mut self, phase: f64, zeta: f64) -> Response {
-        let bits = (phase.to_bits() ^ zeta.to_bits().rotate_left(32)).wrapping_mul(GOLDEN);
-        let (known_phase, known_zeta, known) = &mut self.entries[(bits >> (64 - KNOWN_BITS)) as usize];
-        if (*known_phase, *known_zeta) != (phase, zeta) {
-            (*known_phase, *known_zeta, *known) = (phase, zeta, Response::new(phase, zeta, self.drag));
-        }
-        *known
-    }
-}
-
-/// Golden ratio × 2⁶⁴, which spreads bits.
-const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
-
 /// Number of steps with `phase` = ω·dt after which less than `tolerance` of the initial displacement and velocity
 /// remains, for every damping ratio between the two `zetas`; the largest integer if that never happens.
 ///
