@@ -82,7 +82,12 @@ impl Hair<'_> {
         let largest = self.goal.iter().fold(0.0, |most: f32, cv| most.max(vector::largest(*cv)));
         let mut carried = Carried { rotation: DQuat::identity(), before: DVec3::zeros() };
         let mut change = LengthChange::default();
+        let free_from = self.free_from(how, goal, largest);
         for k in 0..cvs - 1 {
+            if k >= free_from && self.out[k] == self.goal[k] && reached.unfreed_segments == 0 {
+                self.keep_goals(k, &mut change);
+                break;
+            }
             let along = goal[k + 1] - goal[k];
             let length = (to_f64(self.goal[k + 1]) - to_f64(self.goal[k])).norm();
             if length == 0.0 || along.norm() == 0.0 {
@@ -117,6 +122,39 @@ impl Hair<'_> {
             self.measure_clearance(how, nearby, &mut reached);
         }
         reached
+    }
+
+    /// The segment from which on all keep their goals if the first of them starts at its own: they meet nothing however they turn.
+    /// The number of segments if there is none.
+    #[inline(always)]
+    fn free_from(&self, how: &Collide<'_>, goal: &[DVec3], largest: f32) -> usize {
+        let mut first = self.goal.len() - 1;
+        let redirects = how.width.value != 0.0 || how.coherence.value != 0.0 || self.shift != DVec3::zeros();
+        let Some(half_space) = self.half_space.filter(|_| !redirects) else { return first };
+        let root = to_f64(self.rest[0]);
+        while first > 0 {
+            let k = first - 1;
+            let (pivot, end) = (to_f64(self.goal[k]), to_f64(self.goal[k + 1]));
+            let length = (end - pivot).norm();
+            let rounding = 1.2e-7 * (f64::from(largest) + length);
+            let are_own = same(&goal[k], &pivot) & same(&goal[k + 1], &end);
+            let gap = how.gap_at(self.first + k);
+            if !are_own || !half_space.frees_any_turn(&root, &pivot, [length, gap, rounding]) {
+                break;
+            }
+            first = k;
+        }
+        first
+    }
+
+    /// Writes the goals of the segments from the one from CV `first` on.
+    #[inline(always)]
+    fn keep_goals(&mut self, first: usize, change: &mut LengthChange) {
+        for k in first..self.goal.len() - 1 {
+            let length = (to_f64(self.goal[k + 1]) - to_f64(self.goal[k])).norm();
+            self.out[k + 1] = if length == 0.0 { self.out[k] } else { self.goal[k + 1] };
+            change.add(length, length);
+        }
     }
 
     /// How far around a segment blocks of obstacles are kept for the next ones, metres; 0 for curves of few segments.

@@ -155,6 +155,15 @@ impl HalfSpace {
         true
     }
 
+    /// Whether a segment of this length and no thickness from `pivot`, of a curve with this root, meets nothing however it
+    /// turns: whatever [`HalfSpace::frees`] would be told of its directions, it would find nothing within `gap`.
+    #[inline(always)]
+    pub(super) fn frees_any_turn(&self, root: &DVec3, pivot: &DVec3, [length, gap, rounding]: [f64; 3]) -> bool {
+        let away = pivot - root;
+        let rise = self.rise(&away, length + gap + 4.0 * rounding);
+        rise < f64::INFINITY && to_f64(self.up).dot(&away) - rise - rounding - length > gap
+    }
+
     /// Whether the turn of a segment, of a curve with this root, meets nothing: it stays above all obstacles by more
     /// than their distance to be kept.
     #[inline(always)]

@@ -401,6 +401,15 @@ fn tested_start(cvs: &[Vec3], untested: f64) -> Option<Vec3> {
     (length > untested).then(|| to_f32(to_f64(cvs[0]) + along * (untested / length)))
 }
 
+/// Widens a box to include a point; without regard to NaN, which the library's `min` has.
+#[inline(always)]
+fn widen(low: &mut Vec3, high: &mut Vec3, point: Vec3) {
+    for axis in 0..3 {
+        low[axis] = if point[axis] < low[axis] { point[axis] } else { low[axis] };
+        high[axis] = if point[axis] > high[axis] { point[axis] } else { high[axis] };
+    }
+}
+
 /// Whether a curve, whose tested part starts at `start`, crosses the skin. So does one whose start has passed through it
 /// since rest, when it was at `outside`. Segments in the half-space of the curve need no query.
 #[inline(always)]
@@ -424,12 +433,12 @@ fn crosses<'t>(
                 continue;
             }
             tested[k - first] = true;
-            let also = if k == 0 { outside } else { None };
-            for cv in [Some(from), Some(cvs[k + 1]), also].into_iter().flatten() {
-                for axis in 0..3 {
-                    low[axis] = low[axis].min(cv[axis]);
-                    high[axis] = high[axis].max(cv[axis]);
-                }
+            widen(&mut low, &mut high, from);
+            widen(&mut low, &mut high, cvs[k + 1]);
+            if k == 0
+                && let Some(outside) = outside
+            {
+                widen(&mut low, &mut high, outside);
             }
         }
         if low[0] > high[0] {
