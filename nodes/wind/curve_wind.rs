@@ -15,7 +15,7 @@
 //! * `blend` scales each segment's turn instead of mixing positions, so that a partial wind keeps lengths too.
 
 use crate::shared::clump;
-use crate::shared::direction::{GUST_DIR, unit_direction};
+use crate::shared::direction::{GUST_DIR, gust_dir, unit_direction};
 use crate::shared::group::{self, Group};
 use curves::clumps::drawn;
 use curves::wind_bend::{Bend, BendMode, BendNoise, bend};
@@ -191,19 +191,13 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
             blend: cx.mask(BLEND, &curves)?,
             noise: field.as_ref().map(noise).transpose()?,
             // Without shear it is 0 everywhere, which need not be read at each CV.
-            gusts: curves.get(GUST_DIR).filter(|rows| !are_zero(rows)),
+            gusts: gust_dir(&curves),
         },
     );
     cx.publish(MAX_ANGLE, f64::from(bent.max_angle));
     cx.publish(LENGTH_ERROR, f64::from(bent.length_error));
     curves.set(P, bent.points)?;
     Ok(OUT.with(curves))
-}
-
-/// Whether all numbers are 0. Many are compared at once, which `any` does not do.
-fn are_zero(rows: &[[f32; 3]]) -> bool {
-    let without_sign = |x: &f32| x.to_bits() << 1;
-    rows.as_flattened().chunks(1024).all(|chunk| chunk.iter().fold(0, |bits, x| bits | without_sign(x)) == 0)
 }
 
 /// The wind's direction, of length 1.

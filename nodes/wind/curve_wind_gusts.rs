@@ -20,7 +20,7 @@
 //!   frame 0 params are held, so gusts sent then repeat with a constant wind alone; `unlooped_gusts` counts the others.
 
 use crate::shared::clump;
-use crate::shared::direction::{GUST_DIR, unit_direction};
+use crate::shared::direction::{GUST_DIR, no_gust_dir, unit_direction};
 use crate::shared::group::{self, Group};
 use crate::shared::gust_control;
 use curves::clumps::drawn;
@@ -206,7 +206,7 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
         curves.set_column(Owner::Point, GUST.name, gust)?;
     }
     if !shears && cx.needs(GUST_DIR) && curves.get(GUST_DIR).is_none() {
-        let none = no_sides(cx.part(CURVES));
+        let none = no_gust_dir(cx.part(CURVES));
         curves.set_column(Owner::Point, GUST_DIR.name, none)?;
     }
     if let Some(sides) = felt.sides {
@@ -226,12 +226,6 @@ fn cook(cx: &FrameCx) -> Result<Outputs> {
         curves.set(GUST_DIR, all)?;
     }
     Ok(OUT.with(curves))
-}
-
-/// A `gust_dir` of 0: frames whose curves do not move share one array, kept with them.
-fn no_sides(curves: &Component) -> Column {
-    struct Zeros(Column);
-    curves.derived(|curves| Zeros(Column::new(vec![[0.0_f32; 3]; curves.point_count()]))).0.clone()
 }
 
 /// Largest part of `gust_dir` along an axis: the wind itself, of length 1, is then below rounding.
