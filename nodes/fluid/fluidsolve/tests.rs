@@ -362,11 +362,11 @@ fn what_leaves_through_a_periodic_side_comes_in_at_the_other() {
     for (low, high) in whole {
         assert!((low - 0.3).abs() < 0.01 && (high - 0.7).abs() < 0.01, "{whole:?}");
     }
-    // Where a side cuts a drop as small as this, the mesh closed there lacks 2 % of it.
+    // Where a side cuts a drop as small as this, of 3.2 cells radius, the mesh closed there lacks 4 % of it.
     let drifts: Vec<_> =
         out[1..].iter().map(|frame| [VOLUME_DRIFT, VOLUME_DRIFT_RAW, SPRAY].map(|of| metric(frame, of))).collect();
     assert!(
-        drifts.iter().all(|[now, raw, spray]| now.abs() < 3e-3 && raw.abs() < 0.025 && *spray == 0.0),
+        drifts.iter().all(|[now, raw, spray]| now.abs() < 3e-3 && raw.abs() < 0.045 && *spray == 0.0),
         "{drifts:?}"
     );
     assert!(drifts[11][1].abs() < 0.01, "{drifts:?}");

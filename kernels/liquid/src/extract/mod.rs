@@ -2,12 +2,14 @@
 //!
 //! A cube between eight centres has one vertex for each loop in which the surface crosses its edges. A face whose two
 //! inside corners no edge connects is flipped where both of its cubes would pass it twice (Wenger 2013). A vertex lies at
-//! the mean of its crossings, moved onto tricubic φ by one step of Newton's method where its cube has no other.
+//! the mean of its crossings, moved onto tricubic φ by one step of Newton's method where its cube has no other, and then
+//! off it by as much as quads are chords of it.
 //!
 //! Promise: for any φ the mesh is closed and manifold (each edge has two quads, each vertex one fan), quads wind
 //! counter-clockwise seen from outside, and the bits are the same on any number of threads. Along the ends of the domain
 //! the mesh is closed exactly in their planes. Limits: edges sharper than a cell are rounded; φ must be finite.
 
+mod bulge;
 mod cubes;
 mod place;
 mod quads;
@@ -41,7 +43,7 @@ pub struct QuadMesh {
 pub enum Placement {
     /// At the mean of their crossings.
     Mean,
-    /// Moved from there onto tricubic φ.
+    /// Moved from there onto tricubic φ, and off it by what the quads between them miss.
     Projected,
 }
 
@@ -50,10 +52,14 @@ pub enum Placement {
 /// # Panics
 /// Where the vertices are more than a `u32` counts.
 pub fn extract(view: PhiView<'_>, placement: Placement) -> QuadMesh {
-    extract_with(view, placement, |_, _| ()).0
+    let (mut mesh, _) = extract_with(view, placement, |_, _| ());
+    if placement == Placement::Projected {
+        mesh.bulge(&view);
+    }
+    mesh
 }
 
-/// The mesh, and what `of` makes of the cells inside and outside that each quad separates.
+/// The mesh with vertices on φ = 0, before they [`QuadMesh::bulge`], and what `of` makes of the cells inside and outside that each quad separates.
 pub(crate) fn extract_with<T: Send>(
     view: PhiView<'_>,
     placement: Placement,

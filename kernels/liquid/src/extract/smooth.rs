@@ -30,7 +30,7 @@ impl QuadMesh {
         if passes == 0 || self.points.is_empty() {
             return;
         }
-        let walls = Walls { low: low.map(|x| x as f32), high: high.map(|x| x as f32) };
+        let walls = Walls::new(low, high);
         let surfaces = Surfaces::of(self);
         let before = surfaces.volumes(self);
         let (first, neighbours) = self.neighbours(walls);
@@ -145,25 +145,29 @@ impl Areas {
 
 /// The ends of the domain.
 #[derive(Clone, Copy)]
-struct Walls {
+pub(super) struct Walls {
     low: Vec3,
     high: Vec3,
 }
 
 impl Walls {
+    pub(super) fn new(low: Cell, high: Cell) -> Self {
+        Self { low: low.map(|x| x as f32), high: high.map(|x| x as f32) }
+    }
+
     /// Whether a point lies on an end along an axis.
     fn has(&self, axis: usize, point: Vec3) -> bool {
         point[axis] <= self.low[axis] || point[axis] >= self.high[axis]
     }
 
     /// The part of a way that keeps a point on the ends it lies on.
-    fn along(&self, point: Vec3, mut way: Vec3) -> Vec3 {
+    pub(super) fn along(&self, point: Vec3, mut way: Vec3) -> Vec3 {
         (0..3).filter(|axis| self.has(*axis, point)).for_each(|axis| way[axis] = 0.0);
         way
     }
 
     /// Whether a quad lies on an end.
-    fn hold(&self, quad: [Vec3; 4]) -> bool {
+    pub(super) fn hold(&self, quad: [Vec3; 4]) -> bool {
         (0..3).any(|axis| quad.iter().all(|point| self.has(axis, *point)))
     }
 }

@@ -10,7 +10,7 @@ use numerics::parallel;
 use numerics::vector::{Vec3, add, dot, scale, sub, unit};
 use serde::{Deserialize, Serialize};
 
-use crate::extract::{Placement, QuadMesh, extract};
+use crate::extract::{Placement, QuadMesh, extract_with};
 use crate::level_set::{BAND, Distance, Flow, Held, LevelSet, PhiChange, PhiSampler, PhiView, Sides, outward};
 use crate::markers::{FARTHEST, Marker, Markers};
 use crate::rows::{Cell, CellRows, Periods};
@@ -137,11 +137,7 @@ impl MarkedSurface {
     /// lies on it.
     pub fn mesh(&self, solid: Option<&Distance<'_>>) -> QuadMesh {
         let clipped = solid.map(|solid| self.phi_outside(solid));
-        let mut mesh = extract(self.view_of(clipped.as_deref()), Placement::Projected);
-        if let Some(solid) = solid {
-            self.put_outside(&mut mesh, solid);
-        }
-        mesh
+        self.meshed(self.view_of(clipped.as_deref()), solid, |_, _| ()).0
     }
 
     /// φ of surface cells, positive in a solid, but for films on it that are thinner than [`FILM`] cells: they reach into
@@ -184,8 +180,24 @@ impl MarkedSurface {
         clipped
     }
 
+    /// The mesh of one of its views, what is in a solid moved onto that, and what `of` makes of the cells inside and outside that
+    /// each quad separates.
+    pub(crate) fn meshed<T: Send>(
+        &self,
+        view: PhiView<'_>,
+        solid: Option<&Distance<'_>>,
+        of: impl Fn(Cell, Cell) -> T + Sync,
+    ) -> (QuadMesh, Vec<T>) {
+        let (mut mesh, made) = extract_with(view, Placement::Projected, of);
+        if let Some(solid) = solid {
+            self.put_outside(&mut mesh, solid);
+        }
+        mesh.bulge(&view);
+        (mesh, made)
+    }
+
     /// Moves points of a mesh in surface cells that are in a solid onto it.
-    pub(crate) fn put_outside(&self, mesh: &mut QuadMesh, solid: &Distance<'_>) {
+    fn put_outside(&self, mesh: &mut QuadMesh, solid: &Distance<'_>) {
         let size = self.resolution as f32;
         let distance = |at: Vec3| size * solid(scale(at, 1.0 / size));
         parallel::for_each(mesh.points.chunks_mut(CHUNK), |_, points| {

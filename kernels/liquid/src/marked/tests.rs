@@ -54,7 +54,9 @@ fn a_film_on_a_ball_has_no_holes_and_its_volume() {
         assert_eq!(mesh.points.len() as i64 - mesh.quads.len() as i64, 4, "{thickness}");
         for point in &mesh.points {
             let height = ball(*point);
-            assert!(height.abs() < 0.1 || (height - thickness).abs() < 0.1, "{thickness}: {height}");
+            // Vertices stand out by what quads miss of a ball of 8 cells radius.
+            let near = 0.1 + 1.0 / (6.0 * 8.0);
+            assert!(height.abs() < near || (height - thickness).abs() < near, "{thickness}: {height}");
         }
     }
 }

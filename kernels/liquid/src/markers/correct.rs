@@ -18,6 +18,10 @@ const STRAIGHT: f32 = 0.9;
 const OPPOSITE: f32 = -0.5;
 /// Length of the mean of unit normals from which the surface is smooth there.
 const SMOOTH: f32 = 0.97;
+/// The mean square of the distance of markers from each other, from which on they tell how the surface bends.
+const LEAST_SPREAD: f32 = 0.01;
+/// The largest curvature, of a ball of a cell's radius.
+const STEEPEST: f32 = 1.0;
 /// Depth of φ, as the flow carried it, from which markers do not make a cell air. They are left over from surfaces that
 /// met: liquid around would fill that air, lose its volume, and the markers bring it back each step.
 const INSIDE: f32 = 0.2;
@@ -72,22 +76,28 @@ fn surface_distance(point: Vec3, near: [&[Marker]; 4]) -> Option<f32> {
     }
     let closest = closest.sqrt();
     let (mut planes, mut ways, mut normals, mut weights) = (0.0, [0.0; 3], [0.0; 3], 0.0);
+    let (mut squares, mut heights) = (0.0, 0.0);
     for marker in near.into_iter().flatten() {
         let way = sub(point, marker.point);
-        let share = 1.0 - (dot(way, way).sqrt() - closest) * (1.0 / SPREAD);
+        let square = dot(way, way);
+        let share = 1.0 - (square.sqrt() - closest) * (1.0 / SPREAD);
         if share > 0.0 && dot(marker.normal, side) > OPPOSITE {
-            let weight = share * share;
-            planes += weight * dot(marker.normal, way);
+            let (weight, height) = (share * share, dot(marker.normal, way));
+            planes += weight * height;
             ways = add(ways, scale(way, weight));
             normals = add(normals, scale(marker.normal, weight));
             weights += weight;
+            squares += weight * square;
+            heights += weight * height * height;
         }
     }
-    // Where the surface is bent, distances along markers' normals are off to one side by as much as those along the
-    // point's own normal are to the other. At edges there is no such normal.
-    let agreement = length(normals);
-    let is_smooth = agreement > SMOOTH * weights;
-    let distance = if is_smooth { 0.5 * (planes + dot(normals, ways) / agreement) } else { planes } / weights;
+    // Where the surface is bent, it leaves the plane of a marker by half the curvature times the square of the way along it:
+    // by as much as normals turn from marker to marker. Edges have no curvature.
+    let is_smooth = length(normals) > SMOOTH * weights;
+    let spread = squares - dot(ways, ways) / weights;
+    let turn = dot(normals, ways) / weights - planes;
+    let bent = if is_smooth && spread > LEAST_SPREAD * weights { turn / spread } else { 0.0 };
+    let distance = (planes + 0.5 * bent.clamp(-STEEPEST, STEEPEST) * (squares - heights)) / weights;
     let beside = closest > NEXT_TO && distance.abs() < STRAIGHT * closest;
     (!(beside && is_beyond(point, near))).then_some(distance)
 }

@@ -56,6 +56,21 @@ fn turning(middle: f32, steps: u32) -> impl Fn(Vec3) -> Vec3 + Sync {
     move |[x, y, _]| [angle * (middle - y), angle * (x - middle), 0.0]
 }
 
+/// Planes of markers touch a ball from outside: without its curvature it would grow, at 2.5 cells radius by 2 % in a step.
+#[test]
+fn balls_of_a_few_cells_move_with_their_volume() {
+    for (radius, by) in [(2.5, 0.015), (4.0, 0.005), (6.0, 0.0025)] {
+        let mut set = made([30; 3], ball([11.1, 10.8, 11.4], radius));
+        let mut markers = Markers::new(&set, 0, 1);
+        let exact = 4.0 / 3.0 * std::f64::consts::PI * f64::from(radius * radius * radius);
+        for step in 1..=20 {
+            markers.step(&mut set, &|_: Vec3| [0.13, 0.21, 0.08], 0.3);
+            let off = volume(&set) / exact - 1.0;
+            assert!(off.abs() < by, "{radius}, step {step}: {off}");
+        }
+    }
+}
+
 #[test]
 fn the_slotted_disk_keeps_its_slot() {
     let shape = |p: Vec3| slotted(p, [50.0, 75.0, 0.0], false, 1.0);

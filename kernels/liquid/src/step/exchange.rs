@@ -157,7 +157,10 @@ impl<'a> Exchange<'a> {
             let rate = account.rate_to_pour(&flow, filled, before);
             match liquid.is_empty() {
                 true => account.withhold_beyond(0.0),
-                false if rate > 0.0 => out.pours.push(Pour::new(Holder::Source(n), liquid, rate).of(material)),
+                false if rate > 0.0 => {
+                    let deep = cells.deep_cells(liquid, &phi);
+                    out.pours.push(Pour::new(Holder::Source(n), deep, rate).of(material));
+                }
                 false => {}
             }
         }
@@ -240,7 +243,7 @@ impl<'a> Exchange<'a> {
             account.withhold_beyond(most);
         }
         let rate = wanted.min(fastest);
-        (rate > 0.0).then(|| Pour::new(Holder::Sink(n), liquid, -rate))
+        (rate > 0.0).then(|| Pour::new(Holder::Sink(n), cells.deep_cells(liquid, &phi), -rate))
     }
 
     /// Adds what a rate asks for to its account; returns that.

@@ -32,6 +32,7 @@
 //! Time and memory follow the liquid, not the domain: the cells that are stored are chosen anew each substep.
 
 mod balls;
+mod continuity;
 mod domain;
 mod exchange;
 mod first;

@@ -222,7 +222,7 @@ fn largest(field: &[f32]) -> f32 {
 }
 
 /// Nothing flows through closed walls, where the faces of the liquid have not said so.
-fn hold_walls(domain: &Domain, rows: &CellRows, faces: &mut FaceFields<f32>) {
+pub(super) fn hold_walls(domain: &Domain, rows: &CellRows, faces: &mut FaceFields<f32>) {
     for ([y, z], span) in rows.spans() {
         for axis in [1, 2] {
             if domain.wall_at(axis, [span.start, y, z]).is_some_and(Wall::is_solid) {

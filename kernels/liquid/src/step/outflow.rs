@@ -41,6 +41,9 @@ const LOOKS: f32 = 2.0;
 /// The same in a substep, at most.
 const MOST_LOOKS: f32 = 64.0;
 
+/// |φ| up to which it takes tricubic φ to say how much of a face is covered.
+const NEAR: f32 = 1.5;
+
 /// What a flow moves out through the open walls of a domain: each wall face is covered, at each time of the substep, by the
 /// liquid that has come to it by then. `view` is the liquid before; `cell_volume` is in m³.
 pub(super) fn outflow(
@@ -122,7 +125,10 @@ impl OpenWall<'_> {
         let (low, high) = (self.domain.low, self.domain.high);
         let within: Vec3 =
             std::array::from_fn(|axis| point[axis].clamp(low[axis] as f32 + 0.5, high[axis] as f32 - 0.5));
-        let (phi, gradient) = sampler.gradient(within);
+        let (mut phi, mut gradient) = sampler.gradient(within);
+        if phi.abs() < NEAR {
+            (phi, gradient) = self.view.cubic_at(within);
+        }
         phi + dot(gradient, sub(point, within))
     }
 }

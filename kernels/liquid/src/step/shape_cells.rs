@@ -29,6 +29,9 @@ const BEYOND: f32 = 1e3;
 /// Changes of volume that count, in cells.
 const LEAST_VOLUME: f64 = 1e-5;
 
+/// Depth, in cells, from which on all that is next to a cell is liquid.
+const DEEP: f32 = 1.0;
+
 /// Share of a cell that is taken, at least.
 const LEAST_TAKEN: f32 = 0.1;
 
@@ -283,6 +286,15 @@ impl<'a> ShapeCells<'a> {
             cells.swap(0, deepest);
         }
         cells
+    }
+
+    /// Those of liquid cells that lie a cell deep, or half as deep as the deepest: divergence of others would partly be that
+    /// of air.
+    pub(super) fn deep_cells(&self, liquid: Vec<Cell>, phi: &[f32]) -> Vec<Cell> {
+        let depth = |cell: &Cell| self.rows.find(*cell).map_or(0.0, |at| -phi[at]);
+        let deepest = liquid.iter().map(depth).fold(0.0, f32::max);
+        let least = (0.5 * deepest).min(DEEP);
+        liquid.into_iter().filter(|cell| depth(cell) >= least).collect()
     }
 
     fn deepest(&self, cells: &[Cell]) -> Option<usize> {

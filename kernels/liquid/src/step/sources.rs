@@ -135,7 +135,9 @@ impl FlowAccount {
         if flow.gave <= 0.0 && flow.next <= 0.0 {
             return (self.owed / flow.next_seconds).clamp(0.0, before.max(0.0));
         }
-        let wanted = flow.next - filled / flow.seconds + CORRECTION * self.owed / flow.next_seconds;
+        // A very short substep says nothing of how fast a shape goes on to be filled.
+        let filling = filled / flow.seconds.max(flow.next_seconds);
+        let wanted = flow.next - filling + CORRECTION * self.owed / flow.next_seconds;
         wanted.clamp(0.0, (1.0 + CORRECTION) * flow.next.max(flow.gave / flow.seconds))
     }
 

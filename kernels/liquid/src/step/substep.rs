@@ -284,6 +284,7 @@ fn continued(
             velocity
         }
     };
+    let velocity = motion.balanced(&velocity, &rows, domain, solid, steepest);
     continued.velocity = MacVelocity::new(rows, velocity);
     continued
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::phases::{PhasesOfPieces, Ways};
 use crate::carried::{PhaseReader, PhaseShares};
-use crate::extract::{Placement, QuadMesh, extract_with};
+use crate::extract::QuadMesh;
 use crate::level_set::Distance;
 use crate::level_set::{PhiView, floor};
 use crate::marked::MarkedSurface;
@@ -84,13 +84,10 @@ impl Pieces {
         let (view, whole) = (surface.view_of(clipped.as_deref()), surface.view_of(None));
         let inside = view.rows.filtered(|_, at| view.phi[at] < 0.0).clipped(view.low, view.high);
         let is_free = |cell: Cell| contains(view, cell) && whole.rows.find(cell).is_none_or(|at| whole.phi[at] >= 0.0);
-        let (mut mesh, sides) = extract_with(view, Placement::Projected, |inner, outer| Side {
+        let (mesh, sides) = surface.meshed(view, solid, |inner, outer| Side {
             span: inside.span_of(inner).map_or(0, |span| span.base),
             is_free: is_free(outer),
         });
-        if let Some(solid) = solid {
-            surface.put_outside(&mut mesh, solid);
-        }
         let (of_span, count) = numbered(&inside, surface.periods(), &mesh, &sides);
         let all = measured(&inside, &of_span, count, &mesh, &sides);
         let mut found = Self { all, inside, of_span, clipped, phases: PhasesOfPieces::one() };

@@ -76,12 +76,21 @@ fn bubbles_belong_to_the_piece_around_them_and_drops_in_them_do_not() {
     let (mut surface, mut targets) = start([24; 3], move |p| shell(p).min(ball(centre, 3.0)(p)));
     let (shell, drop) = (targets.pieces()[0].volume(), targets.pieces()[1].volume());
     assert_near(drop, alone(3.0), 5e-3);
+    // The mean radius of the faces of the shell.
+    let radii = |surface: &MarkedSurface| {
+        let along: Vec<f32> = surface.mesh(None).points.iter().map(|p| length(sub(*p, centre))).collect();
+        [4.5..7.5, 7.5..9.5].map(|near| {
+            let face: Vec<f32> = along.iter().copied().filter(|r| near.contains(r)).collect();
+            face.iter().sum::<f32>() / face.len() as f32
+        })
+    };
+    let before = radii(&surface);
     targets.add(0.02 * shell, Some([12.0, 12.0, 19.5]));
     let report = targets.correct(&mut surface, None);
     assert!(report.worst < 1e-4 * shell && report.pieces == 2, "{report:?}");
     assert_eq!(targets.pieces()[1].volume(), drop);
-    let along: Vec<f32> = surface.mesh(None).points.iter().map(|p| length(sub(*p, centre))).collect();
-    assert!(along.iter().any(|r| *r > 9.02) && along.iter().all(|r| *r < 5.99 || *r > 9.01), "{along:?}");
+    let after = radii(&surface);
+    assert!(after[0] < before[0] - 0.02 && after[1] > before[1] + 0.02, "{before:?} {after:?}");
 }
 
 /// Pieces share a target alike at every scale, down to cells of a hundredth of a millimetre.
@@ -340,7 +349,7 @@ fn assert_kept((mut liquid, mut targets): (Liquid<MarkedSurface>, VolumeTargets)
     }
     assert!(at_cap <= 6 && last.drift.abs() < 1e-3, "{at_cap} {last:?}");
     // What it would have been.
-    assert!(last.raw_drift < -0.05, "{last:?}");
+    assert!(last.raw_drift < -0.04, "{last:?}");
 }
 
 #[test]

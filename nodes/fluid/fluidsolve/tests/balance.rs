@@ -123,7 +123,7 @@ fn drops_keep_their_ids() {
         rows.filter(|((kind, _), _)| **kind == PARTICLE_SPRAY).map(|((_, id), volume)| (*id, *volume)).collect()
     };
     let (mut stayed, mut last) = (0, Vec::new());
-    for frame in 2..=12 {
+    for frame in 2..=16 {
         let now = drops(frame);
         for (id, volume) in &now {
             if let Some((_, before)) = last.iter().find(|(before, _)| before == id) {

@@ -180,14 +180,15 @@ fn texture_coordinates_follow_a_ball_that_falls_and_one_that_turns() {
         let off = points.iter().zip(&uvw).map(|(p, uvw)| length(sub(*uvw, back(*p))) / 0.44);
         off.fold(0.0, f32::max)
     };
-    // A vertex of so small a ball lies R²/8r outside the markers around it, R being a cell: 6e-3 diameters.
-    assert!(off(&still, 1, &|p| p) < 1.2e-2, "{}", off(&still, 1, &|p| p));
-    assert!(off(&still, 13, &|p| p) < 1.2e-2, "{}", off(&still, 13, &|p| p));
+    // A vertex of so small a ball lies R²/8r outside the markers around it, R being a cell, and R²/6r outside φ = 0, so that
+    // quads do not lie inside: 6e-3 and 8e-3 diameters.
+    assert!(off(&still, 1, &|p| p) < 1.6e-2, "{}", off(&still, 1, &|p| p));
+    assert!(off(&still, 13, &|p| p) < 1.6e-2, "{}", off(&still, 13, &|p| p));
     let falling = still.clone().set(GRAVITY, [0.0, -2.0, 0.0]);
     let out = falling.clone().frames([1, 13]);
     let way = (height(&out[0]) - height(&out[1])) as f32;
     let error = off(&falling, 13, &|p| add(p, [0.0, way, 0.0]));
-    assert!(way > 0.2 && error < 1.2e-2, "{way}: {error}");
+    assert!(way > 0.2 && error < 1.6e-2, "{way}: {error}");
     let turning = still.set(INITIAL_SPIN, [0.0, 0.0, std::f64::consts::PI]);
     // How far so few cells turn is the solver's error, not that of the coordinates: it is measured by their mean.
     let (points, uvw) = tagged(&turning, 13);
