@@ -16,6 +16,8 @@ use numerics::vector::DVec3;
 const MOST_ROUNDS: u32 = 4;
 /// Largest initial displacement of a particle onto a surface, as a fraction of the mean spring length.
 const MOST_NUDGE: f64 = 0.3;
+/// Depth of a particle in an obstacle, relative to the size of the bodies, from which its whole piece is set on the surface.
+const FAR: f64 = 1e6;
 
 impl Stepper<'_> {
     /// Potential contacts of a step in which particles move to `to`, with their loads at the start.
@@ -122,7 +124,8 @@ impl Stepper<'_> {
     }
 
     /// The predicted positions `y`, moved so that contacts stay as deep as at `x` or just touch: friction acts on
-    /// slip, so the initial guess should not contain normal motion.
+    /// slip, so the initial guess should not contain normal motion. Pieces that an obstacle stops at once are set on it as a
+    /// whole: the first directions would leave their particles thousands of sizes apart, from where no descent comes back.
     fn slid(&self, x: &[DVec3], y: &[DVec3], contacts: &[ContactConstraint], h: f64) -> Vec<DVec3> {
         let (mut out, held) = (y.to_vec(), &self.context.external.held);
         for contact in contacts.iter().filter(|contact| contact.is_of_one_point()) {
@@ -133,6 +136,18 @@ impl Stepper<'_> {
             {
                 contact.shift(missing, held, &mut out);
             }
+        }
+        let body = self.context.body;
+        let mut back = vec![DVec3::zeros(); body.order.pieces.len()];
+        for contact in contacts.iter().filter(|contact| !contact.is_two_sided()) {
+            let (depth, piece) =
+                (-contact.clearance(&out, 0.0), self.solver.layout.piece_of(contact.particles[0] as usize));
+            if depth > FAR * body.size && depth > back[piece].norm() {
+                back[piece] = contact.normal * depth;
+            }
+        }
+        for (piece, back) in body.order.pieces.iter().zip(back).filter(|piece| piece.1 != DVec3::zeros()) {
+            body.particles(piece).filter(|particle| !held[*particle]).for_each(|particle| out[particle] += back);
         }
         out
     }
