@@ -10,7 +10,7 @@ use super::edges::Thirds;
 use numerics::lanes::{F32x16, LANES, Lanes, get, set};
 use numerics::simd::kernel;
 use numerics::tree::{Block, Boxes, NONE};
-use numerics::vector::{Vec3, cross, dot, scale, sub};
+use numerics::vector::{Vec3, add, cross, dot, scale, sub};
 
 /// Rounding of a volume, relative to the product of the largest coordinates along each axis; so much that a triangle with a
 /// larger volume and [`BESIDE`] the axis does not seem to contain the axis by rounding alone.
@@ -230,8 +230,7 @@ impl Facings {
 /// The middle of a box.
 #[inline(always)]
 fn centre(low: Vec3, high: Vec3) -> Vec3 {
-    let (a, b) = (scale(low, 0.5), scale(high, 0.5));
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+    add(scale(low, 0.5), scale(high, 0.5))
 }
 
 /// The sum of the sides of a box.
