@@ -383,25 +383,31 @@ impl<W> Cone<W> {
     /// A bit for each lane whose box meets the cone.
     #[inline(always)]
     fn meeting(&self, boxes: &Boxes) -> u16 {
-        let mut mask = 0;
-        for lane in 0..LANES {
-            let mut square = 0.0;
-            for axis in 0..2 {
-                let below = boxes.low[axis].0[lane] - self.at[axis];
-                let above = self.at[axis] - boxes.high[axis].0[lane];
-                let outside = if below > above { below } else { above };
-                let outside = if outside > 0.0 { outside } else { 0.0 };
-                square += outside * outside;
-            }
-            let far = boxes.high[2].0[lane] - self.at[2];
-            let near = boxes.low[2].0[lane] - self.at[2];
-            // A little wider than the cone, to allow for rounding and `ASIDE`.
-            let radius = self.slope * 1.001 * far;
-            let meets = (far > 0.0) & (near <= self.farthest) & (square <= radius * radius);
-            mask |= u16::from(meets) << lane;
-        }
-        mask
+        meeting_cones(boxes, [self.at; 2], self.slope, self.farthest)
     }
+}
+
+/// A bit for each lane whose box meets one of the cones whose tips lie between two corners.
+#[inline(always)]
+pub(super) fn meeting_cones(boxes: &Boxes, [low, high]: [Vec3; 2], slope: f32, farthest: f32) -> u16 {
+    let mut mask = 0;
+    for lane in 0..LANES {
+        let mut square = 0.0;
+        for axis in 0..2 {
+            let below = boxes.low[axis].0[lane] - high[axis];
+            let above = low[axis] - boxes.high[axis].0[lane];
+            let outside = if below > above { below } else { above };
+            let outside = if outside > 0.0 { outside } else { 0.0 };
+            square += outside * outside;
+        }
+        let far = boxes.high[2].0[lane] - low[2];
+        let near = boxes.low[2].0[lane] - high[2];
+        // A little wider than the cone, to allow for rounding and `ASIDE`.
+        let radius = slope * 1.001 * far;
+        let meets = (far > 0.0) & (near <= farthest) & (square <= radius * radius);
+        mask |= u16::from(meets) << lane;
+    }
+    mask
 }
 
 /// Adds the layers that triangles are at the centre of the disc.

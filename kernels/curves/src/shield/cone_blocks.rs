@@ -4,7 +4,7 @@
 //! so that each cone tests sixteen of them at once.
 
 use super::Obstacle;
-use super::cone::DistanceWeight;
+use super::cone::{DistanceWeight, meeting_cones};
 use super::facing::Facings;
 use super::views::View;
 use numerics::lanes::{F32x16, LANES, set};
@@ -108,22 +108,6 @@ impl Region for Cones {
     /// Each number is rounded as for one cone, so that nothing which that meets is missed.
     #[inline(always)]
     fn meeting(&self, boxes: &Boxes) -> u16 {
-        let mut mask = 0;
-        for lane in 0..LANES {
-            let mut square = 0.0;
-            for axis in 0..2 {
-                let below = boxes.low[axis].0[lane] - self.high[axis];
-                let above = self.low[axis] - boxes.high[axis].0[lane];
-                let outside = if below > above { below } else { above };
-                let outside = if outside > 0.0 { outside } else { 0.0 };
-                square += outside * outside;
-            }
-            let far = boxes.high[2].0[lane] - self.low[2];
-            let near = boxes.low[2].0[lane] - self.high[2];
-            let radius = self.slope * 1.001 * far;
-            let meets = (far > 0.0) & (near <= self.farthest) & (square <= radius * radius);
-            mask |= u16::from(meets) << lane;
-        }
-        mask
+        meeting_cones(boxes, [self.low, self.high], self.slope, self.farthest)
     }
 }

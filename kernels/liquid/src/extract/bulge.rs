@@ -1,4 +1,4 @@
-//! Vertices moved off φ = 0 by as much as the quads between them are chords of it.
+//! Vertices moved off φ = 0, so that the mesh encloses the volume that φ < 0 has.
 //!
 //! A mesh whose vertices lie on a ball of radius R encloses less than the ball, by 1/(2 R²) of it where R is counted in
 //! cells: a drop of 2 cells would miss an eighth of its volume.
