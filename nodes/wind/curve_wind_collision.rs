@@ -83,7 +83,7 @@ params! { PARAMS:
         "How strongly curves blown into the skin are redirected outward, so that they do not flip from one side to the \
          other as wind and skin move. At 0 each segment stops at its first contact, which depends on its whole path: a \
          few curves in a thousand jump in each frame. At 1 there are hardly more jumps than in the wind itself (see the \
-         metric `jumps`), few curves touch the skin, and tips move 1 to 3 % less; collision takes 1.7 times as long. The \
+         metric `jumps`), few curves touch the skin, and tips move 1 to 3 % less; collision takes 1.9 times as long. The \
          more directly the wind blows into the skin, the more upright curves stay that would otherwise lie flat. Above 0 \
          a curve may end on the other side of a fold of the skin, but of no other collider; values between 0 and 1 \
          redirect only partly, and leave some of the jumps.")
@@ -170,7 +170,7 @@ const MANY: f64 = 20.0;
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Collision",
-    10,
+    11,
     "Keeps curves that are bent by wind out of colliders. Each segment, root to tip, turns from its rest direction \
      towards the direction that the wind gave it, until it touches a collider. Place this node after the wind, and wire \
      the curves from before the wind into `rest`. Attributes of each curve: `unfreed`, the number of segments that still \

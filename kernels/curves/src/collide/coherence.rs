@@ -5,6 +5,8 @@
 //! presses curves to one side or the other. No continuous map from all directions to those above the skin can leave the
 //! latter unchanged and keep the side of all others; so the deeper a goal lies in the skin, the more upright the
 //! segment is kept, nearly as its goal reflected by the skin; an arch lifts it a little more, off what lies beside it.
+//! Room below a segment is shared with those after it: if each used all of it, curves would zigzag between the skin and the
+//! height of a segment, and turn over where wind or skin change a little.
 
 use numerics::vector::DVec3;
 use std::f64::consts::FRAC_PI_2;
@@ -27,6 +29,25 @@ pub(super) struct Ground {
 }
 
 impl Ground {
+    /// The ground for the first segment of a goal whose CVs from its pivot on these are, metres: where the goal dips into the
+    /// ground, a height that leaves room for the segments after it. Never more than before, the same for a last segment and
+    /// where the goal does not dip, and continuous.
+    ///
+    /// By its share s of the deepest dip, and the room q that there is relative to it, a segment gets s (s + (1 − s) √q) of
+    /// the height: less than its share s, so that curves stay farther off the skin than they need to. With its share alone
+    /// twice as many curves jump on a sphere.
+    #[inline(always)]
+    pub(super) fn shared_with(self, goal: &[DVec3]) -> Self {
+        let depth = |cv: &DVec3| (goal[0] - cv).dot(&self.normal);
+        let deepest = goal[1..].iter().fold(0.0, |most: f64, cv| most.max(depth(cv)));
+        if deepest <= self.height.max(0.0) {
+            return self;
+        }
+        let height = self.height.max(0.0);
+        let (own, room) = (depth(&goal[1]).max(0.0) / deepest, height / deepest);
+        Self { height: height * own * (own + (1.0 - own) * room.sqrt()), ..self }
+    }
+
     /// The direction that replaces `goal` for a segment of this length whose curve runs along `along`: unchanged if the
     /// segment's end is above the ground, otherwise a direction above it. Continuous in all arguments; unit vectors.
     pub(super) fn lead_out(&self, along: &DVec3, goal: &DVec3, length: f64) -> DVec3 {
@@ -90,6 +111,31 @@ mod tests {
         for goal in [-DVec3::z(), DVec3::new(1e-12, 0.0, -1.0), DVec3::new(0.0, -1e-12, -1.0)] {
             let led = ground.lead_out(&DVec3::x(), &goal, 1.0);
             assert!((led - DVec3::new(1.0, 0.0, UPRIGHT).normalize()).norm() < 1e-9, "{led}");
+        }
+    }
+
+    /// A goal that sinks evenly by `depth` in so many segments, and a ground `height` below its first CV, normal z.
+    fn shared(depth: f64, segments: u32, height: f64) -> f64 {
+        let cv = |k: u32| DVec3::new(0.1, 0.0, -depth / f64::from(segments)) * f64::from(k);
+        let goal: Vec<DVec3> = (0..=segments).map(cv).collect();
+        Ground { normal: DVec3::z(), height }.shared_with(&goal).height
+    }
+
+    #[test]
+    fn segments_share_the_room_below_them() {
+        // By hand: a share of 2 in 8, and room for 2: 2 · 0.25 · (0.25 + 0.75 · 0.5).
+        assert_eq!(shared(8.0, 4, 2.0), 0.3125);
+        // Enough room, none, and a pivot below the height that is kept.
+        assert_eq!([shared(8.0, 4, 8.0), shared(8.0, 4, 9.0), shared(8.0, 4, 0.0)], [8.0, 9.0, 0.0]);
+        assert_eq!([shared(8.0, 4, -1e-4), shared(-8.0, 4, 0.5), shared(-8.0, 4, -1e-4)], [0.0, 0.5, -1e-4]);
+        // Where there is just enough room, a segment gets what it needs.
+        let just = shared(8.0, 4, 8.0 * (1.0 - 1e-9));
+        assert!((just - 2.0).abs() < 1e-8, "{just}");
+        for height in (0..100).map(|i| 0.02 * f64::from(i)) {
+            let given = shared(2.0, 1, height);
+            assert_eq!(given, height, "the last segment has all room");
+            let given = shared(2.0, 3, height);
+            assert!((0.0..=height).contains(&given), "{height}: {given}");
         }
     }
 

@@ -98,7 +98,7 @@ impl Hair<'_> {
             }
             let wanted = along / along.norm();
             let rounding = 1.2e-7 * (f64::from(largest) + length);
-            let (segment, ground) = self.segment(how, k, &wanted, [length, rounding], &carried, axes);
+            let (segment, ground) = self.segment(how, k, (&wanted, &goal[k..]), [length, rounding], &carried, axes);
             let way_out = ground.map(|(up, rest)| WayOut { up, rest, others });
             // Not if the skin redirects the segment, or if its goal was raised.
             let may_keep_goal = same(&segment.to, &wanted) && same(&goal[k + 1], &to_f64(self.goal[k + 1]));
@@ -170,14 +170,14 @@ impl Hair<'_> {
         (KEPT_SEGMENTS * whole / (self.goal.len() - 1) as f64) as f32
     }
 
-    /// The segment from CV k, about to turn towards the unit vector `wanted`; with coherence, the
-    /// skin's normal under it and its direction at rest.
+    /// The segment from CV k, about to turn towards the unit vector `wanted`, along the goals from CV k on; with coherence,
+    /// the skin's normal under it and its direction at rest.
     #[inline(always)]
     fn segment<'a>(
         &self,
         how: &Collide<'_>,
         k: usize,
-        wanted: &DVec3,
+        (wanted, goal): (&DVec3, &[DVec3]),
         [length, rounding]: [f64; 2],
         carried: &Carried,
         axes: &'a mut TurnAxes,
@@ -188,7 +188,7 @@ impl Hair<'_> {
         axes.push(from);
         let pivot = to_f64(self.out[k]);
         let (mut to, mut way_out) = (*wanted, None);
-        if let Some((ground, coherence)) = how.ground(self.first + k, &pivot, length) {
+        if let Some((ground, coherence)) = how.ground(self.first + k, &pivot, length, goal) {
             to = part_way(wanted, &ground.lead_out(&from, wanted, length), &axes.last(), coherence);
             way_out = Some((ground.normal, rest.unwrap_or(*wanted)));
         }

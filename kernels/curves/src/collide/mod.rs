@@ -87,14 +87,17 @@ const KEPT_GAPS: f64 = 2.0;
 const MOST_KEPT: f64 = 0.25;
 
 impl Collide<'_> {
-    /// The skin that the segment from CV `cv` is to be redirected out of, if any, and by how much; its end is kept off it by
-    /// more than the gap.
+    /// The skin that the segment from CV `cv` at `pivot`, of this length, is to be redirected out of, if any, and by how much;
+    /// its end is kept off it by more than the gap. `goal` holds the curve's goals from that CV on.
     #[inline(always)]
-    fn ground(&self, cv: usize, pivot: &DVec3, length: f64) -> Option<(Ground, f64)> {
+    fn ground(&self, cv: usize, pivot: &DVec3, length: f64, goal: &[DVec3]) -> Option<(Ground, f64)> {
         let coherence = self.coherence_at(cv);
-        let ground = self.skin.as_ref().filter(|_| coherence > 0.0)?.ground(pivot, length)?;
+        let skin = self.skin.as_ref().filter(|_| coherence > 0.0)?;
+        // As far as the rest of the curve reaches, which shares the room.
+        let reach = goal.windows(2).fold(0.0, |reach, ends| reach + (ends[1] - ends[0]).norm());
+        let ground = skin.ground(pivot, reach)?;
         let kept = (KEPT_GAPS * self.gap_at(cv)).min(MOST_KEPT * length);
-        Some((Ground { height: ground.height - kept, ..ground }, coherence))
+        Some((Ground { height: ground.height - kept, ..ground }.shared_with(goal), coherence))
     }
 
     #[inline(always)]

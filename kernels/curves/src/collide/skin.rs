@@ -119,10 +119,10 @@ impl SkinSurface<'_> {
         Some((height, normal))
     }
 
-    /// The skin below a segment at `pivot`, if within its reach.
+    /// The skin below a segment at `pivot`, if within `reach`, metres.
     #[inline(always)]
-    pub(super) fn ground(&self, pivot: &DVec3, length: f64) -> Option<Ground> {
-        let (height, normal) = self.height(pivot, length as f32)?;
+    pub(super) fn ground(&self, pivot: &DVec3, reach: f64) -> Option<Ground> {
+        let (height, normal) = self.height(pivot, reach as f32)?;
         Some(Ground { normal, height: height.max(0.0) })
     }
 

@@ -37,6 +37,37 @@ fn ends_stay_two_gaps_over_a_floor_and_wind_straight_down_leaves_them_upright() 
     assert!(sides[0].y > 0.9 && (sides[0] - sides[1]).norm() < 1e-4, "{sides:?}");
 }
 
+/// Wind that bends a hair more and more into the floor makes an arch of it. If each segment used all room below it, they
+/// would go up and down in turns.
+#[test]
+fn hairs_do_not_zigzag() {
+    let (points, triangles) = floor();
+    let (tree, normals) = (TriangleTree::build(&points, &triangles), normals(&points, &triangles));
+    let skin = SkinSurface { tree: &tree, triangles: &triangles, normals: &normals };
+    let obstacles = [&tree];
+    let how = Collide { skin: Some(skin), coherence: 1.0.into(), ..on(&obstacles) };
+    let hair = |directions: [f64; 6]| -> Vec<Vec3> {
+        let mut at = DVec3::new(0.1, 0.0, 0.2);
+        let step = |degrees: f64| {
+            let (sine, cosine) = libm::sincos(degrees.to_radians());
+            DVec3::new(cosine, sine, 0.0) * 0.1
+        };
+        let later = directions.map(|degrees| {
+            at += step(degrees);
+            to_f32(at)
+        });
+        std::iter::once([0.1, 0.0, 0.2]).chain(later).collect()
+    };
+    let rest = hair([80.0; 6]);
+    for deepest in (40..90).step_by(5).map(f64::from) {
+        let goal = hair([0.1, 0.5, 0.7, 0.9, 1.0, 1.0].map(|share| -share * deepest));
+        let out = collide(&[0, 7], &rest, &goal, &how).points;
+        let rises: Vec<bool> = out.windows(2).map(|ends| ends[1][1] > ends[0][1]).collect();
+        assert!(out[1..].iter().all(|cv| cv[1] > 0.0), "{deepest}: {out:?}");
+        assert!(rises[0] && rises.windows(2).filter(|two| two[0] != two[1]).count() <= 1, "{deepest}: {rises:?}");
+    }
+}
+
 #[test]
 fn obstacles_besides_the_skin_are_not_passed() {
     // A sheet across the way at 45°, well over the floor, and below it the goal, which is free.
