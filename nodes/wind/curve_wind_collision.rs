@@ -14,8 +14,8 @@
 //!   0.50 % of all curves by more than a quarter of their length in a frame, collision raises that to 1.07 %, and to
 //!   0.63 % at `coherence` 1 (tests/wind/coherence.rs); docs/wind.md has other bodies.
 //! * `loft` keeps a share of the height of what the wind presses down, which first contact lays on the skin. Heights
-//!   are those over the skin as it curves at the root: over its tangent plane fur would stand off a curved skin. It is 0 by
-//!   default: on smooth bodies a third fewer tips jump with it, on the bear a third more do (docs/wind.md).
+//!   are those over the skin as it curves at the root: over its tangent plane fur would stand off a curved skin; over the skin
+//!   itself, more tips jump, and collision takes twice as long. It is 0 by default: on smooth bodies a third fewer tips jump with it, on the bear a third more do (docs/wind.md).
 //! * A segment may be carried to where no turn about its CV frees it, which W leaves open. Then the whole curve is blended
 //!   towards rest, up to its first pose that crosses nothing.
 //! * `offset_scale` only raises segments that would lie lower: wind may lift fur off the skin.
@@ -64,8 +64,10 @@ params! { PARAMS:
          let the wind press it down. Negative values turn this off.")
         .soft(-1.0, 1.0);
     LOFT: Param<Maskable> = Param::maskable("loft", 0.0,
-        "Share of its rest height that a CV keeps, at least, where the wind presses it down; heights are measured above \
-         the curved skin. A little keeps a coat from lying on the skin, so that far fewer curves touch it. On most \
+        "Share of its rest height that the goal of a CV keeps, at least, where the wind presses it down. Heights are measured \
+         above a smooth surface that curves as the skin does at the root: exact on a plane and, at 0.5, to 5 % on a sphere; elsewhere \
+         a half to three quarters of the CVs keep their share to 5 %, others less. Use `offset_scale` where heights \
+         must hold. A little keeps a coat from lying on the skin, so that far fewer curves touch it. On most \
          bodies fewer curves jump as the wind turns. It is multiplied by 1 − `coherence`. 0 is as in the paper.")
         .within(0.0, 1.0).when(|params| {
             let coherence = params.get(COHERENCE);

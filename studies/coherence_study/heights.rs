@@ -1,4 +1,4 @@
-//! Which heights above the skin `offset_scale` keeps.
+//! Which heights above the skin `offset_scale` and `loft` keep.
 
 use crate::collided_with;
 use crate::scene::{Case, Groom, Sample};
@@ -8,7 +8,14 @@ use numerics::vector::{Vec3, to_f64};
 /// Heights at rest below this are not judged, metres.
 const LEAST: f64 = 1e-3;
 
-/// Of the CVs that the wind presses below their share of the height at rest, those that `offset_scale` brings back.
+/// What keeps heights, and which share of them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum KeptBy {
+    OffsetScale(f64),
+    Loft(f64),
+}
+
+/// Of the CVs that the wind presses below their share of the height at rest, those that are brought back.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Heights {
     pub(crate) pressed: usize,
@@ -25,16 +32,21 @@ const ERRORS: [f64; 2] = [0.02, 0.05];
 
 impl Heights {
     /// On a still skin, in so many samples of a turn of the wind.
-    pub(crate) fn on(groom: &Groom, share: f64, samples: u32) -> Self {
+    pub(crate) fn on(groom: &Groom, by: KeptBy, samples: u32) -> Self {
         let mut sum = Self::default();
         for sample in 0..samples {
-            sum.add(groom, &groom.at(Case::Still, 360.0 * f64::from(sample) / f64::from(samples)), share);
+            sum.add(groom, &groom.at(Case::Still, 360.0 * f64::from(sample) / f64::from(samples)), by);
         }
         sum
     }
 
-    fn add(&mut self, groom: &Groom, sample: &Sample, share: f64) {
-        let out = collided_with(groom, sample, |how| Collide { offset_scale: Some(share.into()), ..how });
+    fn add(&mut self, groom: &Groom, sample: &Sample, by: KeptBy) {
+        let (share, out) = match by {
+            KeptBy::OffsetScale(share) => {
+                (share, collided_with(groom, sample, |how| Collide { offset_scale: Some(share.into()), ..how }))
+            }
+            KeptBy::Loft(share) => (share, collided_with(groom, sample, |how| Collide { loft: share.into(), ..how })),
+        };
         self.length_error = self.length_error.max(out.length_error);
         let [rest, goal, now] = [&sample.rest, &sample.goal, &out.points].map(|points| heights(groom, sample, points));
         for cv in (0..now.len()).filter(|cv| groom.is_judged(sample.rest[*cv])) {
@@ -80,7 +92,7 @@ mod tests {
         {
             let groom = Groom::on(Body::named(body), 1_500);
             for share in [1.0, 0.5] {
-                let heights = Heights::on(&groom, share, 3);
+                let heights = Heights::on(&groom, KeptBy::OffsetScale(share), 3);
                 let kept = heights.percents()[rank];
                 println!("{body}, {share}: {:?} of {}", heights.percents(), heights.pressed);
                 assert!(heights.pressed > 300 && kept >= least, "{body}, {share}: {kept} %");

@@ -6,7 +6,8 @@
 //! of samples: a frame apart (still, moving), an eighth of one (eighths) or a quarter (storm). Jumps are tips that move by
 //! more than a quarter of their length; those are added whose curves do not jump in the wind alone.
 //!
-//! `… --bin coherence_study heights`: which heights above the skin `offset_scale` 1 and 0.5 keep, on these bodies and a plane. `unfreed`: which segments cross in a storm.
+//! `… --bin coherence_study heights`: which heights above the skin `offset_scale` and `loft` keep, on these bodies and a
+//! plane. `unfreed`: which segments cross in a storm.
 
 mod bodies;
 mod crossing;
@@ -15,7 +16,7 @@ mod scene;
 
 use bodies::Body;
 use curves::collide::{Collide, Collided, ContactMethod, SkinSurface, collide};
-use heights::Heights;
+use heights::{Heights, KeptBy};
 use numerics::vector::{Vec3, length, sub};
 use scene::{CVS, Case, Groom, Sample};
 
@@ -109,15 +110,17 @@ fn print_unfreed(curves: usize) {
 }
 
 fn print_heights(curves: usize) {
-    println!("body    offset_scale  pressed CVs  at most 2 % low  5 % low  within 5 %  length error");
+    println!("body    kept by            pressed CVs  at most 2 % low  5 % low  within 5 %  length error");
     for body in ["plane", "camel", "folds", "knot", "sphere"] {
         let groom = Groom::on(Body::named(body), curves);
-        for share in [1.0, 0.5] {
-            let heights = Heights::on(&groom, share, 12);
+        for by in [KeptBy::OffsetScale(1.0), KeptBy::OffsetScale(0.5), KeptBy::Loft(0.5), KeptBy::Loft(0.1)] {
+            let heights = Heights::on(&groom, by, 12);
             let [two, five, within] = heights.percents();
             println!(
-                "{body:7} {share:12} {:12} {two:14.2} % {five:6.2} % {within:9.2} % {:13.1e}",
-                heights.pressed, heights.length_error
+                "{body:7} {:17} {:12} {two:14.2} % {five:6.2} % {within:9.2} % {:13.1e}",
+                format!("{by:?}"),
+                heights.pressed,
+                heights.length_error
             );
         }
     }
