@@ -101,8 +101,10 @@ mod tests {
         assert_eq!([(p + q).xyz(), (p - q).xyz(), (p * 0.3).xyz()], [a + b, a - b, a * 0.3]);
         assert_eq!(p.dot(q), a.dot(&b));
         let (mut sum, mut quad) = (a, p);
-        (sum += b, quad += q);
-        (sum -= a * 0.1, quad -= p * 0.1);
+        sum += b;
+        sum -= a * 0.1;
+        quad += q;
+        quad -= p * 0.1;
         assert_eq!(quad.xyz(), sum);
         let wide = Quad::widened([0.5, 0.1, -2.0, 7.0]);
         assert_eq!((wide.xyz(), wide.fourth()), (DVec3::new(0.5, f64::from(0.1_f32), -2.0), 7.0));
