@@ -24,6 +24,7 @@ pub mod parallel;
 pub mod partition;
 pub mod pieces;
 pub mod point_tree;
+pub mod quad;
 pub mod ramp;
 pub mod random;
 pub mod rank_one;

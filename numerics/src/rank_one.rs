@@ -5,6 +5,7 @@
 //! f32: rigid motions are resisted only to 1e-7.
 
 use crate::partition::{Partition, RaggedSlice};
+use crate::quad::Quad;
 use crate::vector::{DVec3, Vec3, to_f32, to_f64};
 
 /// Rank-one terms, stored by term and by particle.
@@ -29,9 +30,17 @@ pub struct RankOneTerms {
 /// An entry as stored for its particle.
 #[derive(Clone, Copy, Debug, Default)]
 struct At {
+    /// With a fourth lane of 0.
+    along: [f32; 4],
     row: u32,
     entry: u32,
-    along: Vec3,
+}
+
+impl At {
+    #[inline(always)]
+    fn along(&self) -> DVec3 {
+        Quad::widened(self.along).xyz()
+    }
 }
 
 impl RankOneTerms {
@@ -59,7 +68,7 @@ impl RankOneTerms {
         for row in 0..starts.len() - 1 {
             for entry in starts[row]..starts[row + 1] {
                 let slot = &mut next[particles[entry as usize] as usize];
-                self.at[*slot as usize] = At { row: row as u32, entry, along: [0.0; 3] };
+                self.at[*slot as usize] = At { row: row as u32, entry, ..At::default() };
                 *slot += 1;
             }
         }
@@ -119,12 +128,12 @@ impl RankOneTerms {
         }
         let along = &self.along;
         clusters.for_each(RaggedSlice::new(&self.at_starts, &mut self.at), |_, mut mine| {
-            mine.iter_mut().flatten().for_each(|at| at.along = along[at.entry as usize]);
+            mine.iter_mut().flatten().for_each(|at| at.along[..3].copy_from_slice(&along[at.entry as usize]));
         });
     }
 
     /// Computes g·p of each term, for [`RankOneTerms::push`].
-    pub fn measure(&mut self, p: &[DVec3]) {
+    pub fn measure(&mut self, p: &[Quad]) {
         if self.is_empty() {
             return;
         }
@@ -134,7 +143,7 @@ impl RankOneTerms {
             for (row, change) in partition.range(part).zip(mine) {
                 let entries = starts[row] as usize..starts[row + 1] as usize;
                 let each = particles[entries.clone()].iter().zip(&along[entries]);
-                *change = each.fold(0.0, |sum, (particle, g)| sum + to_f64(*g).dot(&p[*particle as usize]));
+                *change = each.fold(0.0, |sum, (particle, g)| sum + to_f64(*g).dot(&p[*particle as usize].xyz()));
             }
         });
     }
@@ -150,15 +159,19 @@ impl RankOneTerms {
 
     /// Σ g·(g·p) at `particle`.
     #[inline(always)]
-    pub fn push(&self, particle: usize) -> DVec3 {
-        self.at(particle).iter().fold(DVec3::zeros(), |sum, at| sum + to_f64(at.along) * self.change[at.row as usize])
+    pub fn push(&self, particle: usize) -> Quad {
+        let mut sum = Quad::default();
+        for at in self.at(particle) {
+            sum += Quad::widened(at.along) * self.change[at.row as usize];
+        }
+        sum
     }
 
     /// Adds `weight` times the diagonal block of `particle` to `block`, of the terms before `end`.
     #[inline(always)]
     pub fn add_block(&self, particle: usize, weight: f64, end: usize, block: &mut [f64; 6]) {
         for at in self.at(particle).iter().take_while(|at| (at.row as usize) < end) {
-            add_square(block, to_f64(at.along), weight);
+            add_square(block, at.along(), weight);
         }
     }
 

@@ -10,6 +10,7 @@
 //! inside each other come apart less evenly with it.
 
 use super::stage::{Stage, StageSolver};
+use numerics::quad::Quad;
 use numerics::vector::DVec3;
 
 impl StageSolver {
@@ -36,8 +37,11 @@ impl StageSolver {
         }
         if closed {
             self.complete_in_contact(stage, x);
-            self.system.apply(stage.context.body, &self.dx, &mut self.r);
-            self.r.iter_mut().zip(right).for_each(|(r, right)| *r = *right - *r);
+            let dx: Vec<Quad> = self.dx.iter().copied().map(Quad::new).collect();
+            let mut product = vec![Quad::default(); dx.len()];
+            self.system.apply(stage.context.body, &dx, &mut product);
+            let left = right.iter().zip(product).map(|(right, product)| right - product.xyz());
+            self.r.iter_mut().zip(left).for_each(|(r, left)| *r = left);
         }
         closed
     }

@@ -9,6 +9,7 @@ use super::coarse::{ClusterMotions, MODES};
 use super::state::CachedCoarseFactor;
 use super::system::{System, solve_lower, solve_lower_transpose};
 use numerics::cholesky::EnvelopeMatrix;
+use numerics::quad::Quad;
 use numerics::simd::Path;
 use numerics::vector::{DVec3, Vec3};
 
@@ -80,7 +81,7 @@ impl<'a> Coarse<'a> {
     /// Adds an approximate solution of A·dx = r to `x` and updates the residual `r`, which is 0 at pinned particles and
     /// stays so.
     pub(super) fn solve(&self, system: &mut System, limits: Limits, x: &mut [DVec3], r: &mut [DVec3]) -> Reached {
-        let (mut p, mut ap) = (vec![DVec3::zeros(); r.len()], vec![DVec3::zeros(); r.len()]);
+        let (mut p, mut ap) = (vec![Quad::default(); r.len()], vec![Quad::default(); r.len()]);
         let mut modes = Vec::new();
         let start = self.start(system, r, &mut modes);
         let mut reached = Reached { iterations: 0, share: 0.0, start, met: start.is_finite() };
@@ -102,8 +103,8 @@ impl<'a> Coarse<'a> {
                 (&mut x[..], &mut r[..]),
                 |cluster, (x, r): (&mut [DVec3], &mut [DVec3])| {
                     for ((particle, x), r) in self.body.order.clusters.range(cluster).zip(x).zip(&mut *r) {
-                        *x += p[particle] * alpha;
-                        *r -= ap[particle] * alpha;
+                        *x += p[particle].xyz() * alpha;
+                        *r -= ap[particle].xyz() * alpha;
                     }
                     self.of_cluster(system, cluster, r)
                 },
@@ -128,8 +129,8 @@ impl<'a> Coarse<'a> {
     }
 
     /// Sets the search direction `p` to the preconditioned residual plus `beta` times the last direction.
-    fn update_direction(&self, system: &System, modes: &[f64], r: &[DVec3], beta: f64, p: &mut [DVec3]) {
-        self.body.order.clusters.for_each(p, |cluster, mine: &mut [DVec3]| {
+    fn update_direction(&self, system: &System, modes: &[f64], r: &[DVec3], beta: f64, p: &mut [Quad]) {
+        self.body.order.clusters.for_each(p, |cluster, mine: &mut [Quad]| {
             let own = modes.get(MODES * cluster..MODES * (cluster + 1));
             for (particle, p) in
                 self.body.order.clusters.range(cluster).zip(mine).filter(|(particle, _)| !system.held[*particle])
@@ -137,16 +138,16 @@ impl<'a> Coarse<'a> {
                 let smoother = &system.smoother[particle];
                 let fine = solve_lower_transpose(smoother, solve_lower(smoother, r[particle]));
                 let coarse = own.map_or(DVec3::zeros(), |modes| self.motions.moved(modes, particle));
-                *p = fine + coarse + *p * beta;
+                *p = Quad::new(fine + coarse) + *p * beta;
             }
         });
     }
 
     /// The preconditioner applied to `r`, an approximation of A⁻¹r.
     pub(super) fn precondition(&self, system: &System, r: &[DVec3]) -> Vec<DVec3> {
-        let (mut modes, mut out) = (Vec::new(), vec![DVec3::zeros(); r.len()]);
+        let (mut modes, mut out) = (Vec::new(), vec![Quad::default(); r.len()]);
         self.start(system, r, &mut modes);
         self.update_direction(system, &modes, r, 0.0, &mut out);
-        out
+        out.into_iter().map(Quad::xyz).collect()
     }
 }

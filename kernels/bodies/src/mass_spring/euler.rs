@@ -85,15 +85,18 @@ impl Stepper<'_> {
         let stage = Stage::new(self.context, [&y, &z], h, times[1]);
         let scale = self.scale(&stage, &start.x, contacts, h);
         let mut solved = Solved::default();
-        for round in 1..=MOST_ROUNDS {
+        self.solver.hurried = self.is_spent();
+        let most_rounds = if self.solver.hurried { 1 } else { MOST_ROUNDS };
+        for round in 1..=most_rounds {
             let again = self.solver.descend(&stage, contacts, scale, &solved, &mut x);
             solved = Solved { residual: again.residual, ..sum(solved, again) };
             let (mut found, missed) = self.find_missed(contacts, step, &x);
             // Contacts that were deep before are being separated.
             let sank = |c: &&ContactConstraint| c.is_too_deep(&x) && c.clearance(&x, 0.0) < c.clearance(&start.x, h);
             solved.unmet = found.iter().filter(sank).map(|c| -c.clearance(&x, 0.0)).fold(0.0, f64::max);
+            solved.passed = found.iter().filter(sank).any(|c| -c.clearance(&x, 0.0) > c.gap);
             solved.deepest = deepest(&found, &x);
-            if round == MOST_ROUNDS || !missed {
+            if round == most_rounds || !missed {
                 break;
             }
             take_loads(contacts, &mut found);

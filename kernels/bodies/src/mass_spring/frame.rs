@@ -245,9 +245,6 @@ impl Stepper<'_> {
         const HELPS: f64 = 0.9;
         /// Steps longer than this fraction of the frame are always halved.
         const SHORT: f64 = 1.0 / 16.0;
-        /// Newton iterations of a frame after which steps are accepted, so that the frame ends; by default, and with a
-        /// tolerance.
-        const MOST_NEWTON: [u32; 2] = [400, 4000];
         let share = times[1] - times[0];
         let shortest = share * f64::from(MOST_STEPS) < 2.0;
         let turns = self.least_steps(motion, times);
@@ -269,7 +266,10 @@ impl Stepper<'_> {
         if (unmet > 0.0 || stepped.solved.failed) && !no_help {
             parts = parts.max(2);
         }
-        let is_over = self.report.newton >= MOST_NEWTON[usize::from(self.tolerance.is_some())] || shortest;
+        // What went through while solves converged has a step that is too long, not contacts in conflict. A part that follows
+        // an impact in the same frame would otherwise pass what it meets.
+        let missed = stepped.solved.passed && stepped.solved.caps == 0 && share > SHORT;
+        let is_over = self.is_spent() && !missed || shortest;
         if self.frame.substeps > 0 || (self.frame.cancelled)() || is_over || parts < 2 {
             self.report.uncut_impacts += u32::from(wanted > 1 && !shortest);
             self.report.tolerance_missed += u32::from(stepped.estimate > allowed);
@@ -283,6 +283,14 @@ impl Stepper<'_> {
         let parts = parts.min((share * f64::from(MOST_STEPS)) as u32).max(2);
         let deepest = if unmet > 0.0 { unmet } else { deepest };
         self.advance_in(parts, motion, times, deepest);
+    }
+
+    /// Whether the frame took so many Newton iterations that steps are accepted, so that it ends. Where `substeps` sets their
+    /// number, each is solved like the first.
+    pub(super) fn is_spent(&self) -> bool {
+        /// By default, and with a tolerance.
+        const MOST_NEWTON: [u32; 2] = [400, 4000];
+        self.frame.substeps == 0 && self.report.newton >= MOST_NEWTON[usize::from(self.tolerance.is_some())]
     }
 
     /// The number of parts that a step between `times` has to be cut into because of obstacles that turn.

@@ -31,6 +31,8 @@ pub(super) struct LoadBalance {
     change: f64,
     /// Change of single loads, relative to their sum.
     single: f64,
+    /// Whether there are any.
+    loaded: bool,
 }
 
 impl LoadBalance {
@@ -40,6 +42,11 @@ impl LoadBalance {
 
     pub(super) fn agrees(&self) -> bool {
         self.change <= TOLERATED_CHANGE && self.single <= TOLERATED_SINGLE
+    }
+
+    /// Whether there are loads that bodies are in balance under, and that are the normal forces: nothing bounces.
+    pub(super) fn is_settled(&self) -> bool {
+        self.loaded && self.is_in_balance() && self.agrees()
     }
 
     /// Whether no more force is left on a body than its contacts exert.
@@ -88,6 +95,7 @@ impl StageSolver {
         if pieces.iter().all(|piece| piece.sum == 0.0 && piece.single == 0.0) {
             return balance;
         }
+        balance.loaded = true;
         let left: Vec<DVec3> = self.r.iter().zip(&body.mass).map(|(r, mass)| r / (stage.a * stage.a * mass)).collect();
         for (piece, loads) in
             body.order.pieces.iter().zip(&pieces).filter(|piece| piece.1.single > 0.0 || piece.1.sum > 0.0)

@@ -59,7 +59,7 @@ impl Galerkin<'_> {
             let mut own = system.blocks.get(particle).copied().unwrap_or_default();
             let mut alike = system.inertia[particle];
             for record in across {
-                let (other, alpha, w) = (record.other as usize, f64::from(record.alpha), record.along());
+                let (other, alpha, w) = (record.other as usize, record.alpha(), record.along());
                 alike += alpha;
                 add_square(&mut own, w, 1.0);
                 let home = layout.cluster[other] as usize;
@@ -99,7 +99,7 @@ impl Galerkin<'_> {
         let held = ends.map(|end| self.system.held[end]);
         if held == [false; 2] && filters == [None; 2] {
             let [here, there] = ends.map(|end| to_f64(self.motions.offset_from_centroid[end]));
-            block.add_turn(f64::from(record.alpha), record.along(), here - there);
+            block.add_turn(record.alpha(), record.along(), here - there);
             return;
         }
         for (scale, direction) in directions(record) {
@@ -179,7 +179,7 @@ struct Coupling {
 /// The directions in which a spring has stiffness, each with that stiffness.
 #[inline(always)]
 fn directions(record: &Record) -> impl Iterator<Item = (f64, DVec3)> {
-    let alpha = f64::from(record.alpha);
+    let alpha = record.alpha();
     let alike = [DVec3::x(), DVec3::y(), DVec3::z()].map(|axis| (alpha, axis));
     std::iter::once((1.0, record.along())).chain(alike.into_iter().take(if alpha > 0.0 { 3 } else { 0 }))
 }

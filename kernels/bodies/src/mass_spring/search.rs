@@ -14,6 +14,8 @@ const SHARE: f64 = 0.05;
 /// Tolerance of linear solves with contacts, relative to the residual: more Newton iterations follow anyway. With 0.2 those
 /// of stiff bodies that hit a surface do not find their loads of friction.
 const CG_SHARE_LINE_SEARCH: f64 = 0.17;
+/// Where loads are settled, a solve need not leave less than this share of the residual that suffices.
+const CG_SHARE_LAST: f64 = 0.5;
 /// Largest number of step halvings in a line search.
 const HALVINGS: usize = 16;
 /// A line search that took more than this fraction of its step indicates how much decrease is left.
@@ -21,7 +23,8 @@ const LONG: f64 = 0.2;
 /// Newton iterations of a stage without contacts, and with contacts.
 const MOST: u32 = 12;
 const MOST_IN_CONTACT: u32 = 60;
-/// The same where obstacles leave no room, so that loads have no balance.
+/// The same in a frame that took too many already, and where obstacles leave no room, so that loads have no balance.
+const MOST_HURRIED: u32 = 30;
 const MOST_JAMMED: u32 = 20;
 /// Changes of the loads of friction after which these stay fixed, so that the descent terminates.
 const MOST_RELOADS: u32 = 20;
@@ -64,6 +67,7 @@ impl StageSolver {
         let most = match (contacts.is_empty(), jammed) {
             (true, _) => MOST,
             (_, true) => MOST_JAMMED,
+            (_, false) if self.hurried => MOST_HURRIED,
             (_, false) => MOST_IN_CONTACT,
         };
         let mut solved = Solved::default();
@@ -113,6 +117,9 @@ impl StageSolver {
             // Forces that are left on bodies as wholes are a small part of the residual.
             let asked = match (stage.contacts.is_empty(), (now <= solved.enough || slow) && !deep) {
                 (true, _) => CG_SHARE,
+                (false, false) if balance.is_settled() && !deep => {
+                    CG_SHARE_LINE_SEARCH.max(CG_SHARE_LAST * (solved.enough / now).sqrt())
+                }
                 (false, false) => CG_SHARE_LINE_SEARCH,
                 (false, true) => CG_SHARE_PRECISE,
             };

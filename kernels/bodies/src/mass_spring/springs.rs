@@ -10,9 +10,10 @@
 use super::body::SoftBody;
 use numerics::adjacency::{Adjacency, Incident};
 use numerics::partition::RaggedSlice;
+use numerics::quad::Quad;
 use numerics::random::Key;
 use numerics::simd::{Path, kernel};
-use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
+use numerics::vector::DVec3;
 
 /// Springs that are linearised together.
 const LANES: usize = 8;
@@ -21,11 +22,10 @@ const MOST_STIFFNESS: f64 = 1e24;
 
 /// Stiffness of a spring, H·d = αd + w(w·d), with d the displacement of this end relative to the other.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[repr(C)]
 pub(super) struct Record {
+    /// w, α.
+    stiffness: [f32; 4],
     pub(super) other: u32,
-    pub(super) alpha: f32,
-    pub(super) w: Vec3,
 }
 
 /// Current rest lengths, and which springs are torn (may be empty: none).
@@ -43,17 +43,27 @@ impl RestLengths<'_> {
 }
 
 impl Record {
+    #[inline(always)]
+    fn new(other: u32, alpha: f64, w: DVec3) -> Self {
+        Self { stiffness: [w.x, w.y, w.z, alpha].map(|x| x as f32), other }
+    }
+
+    #[inline(always)]
+    pub(super) fn alpha(&self) -> f64 {
+        f64::from(self.stiffness[3])
+    }
+
     /// The vector w.
     #[inline(always)]
     pub(super) fn along(&self) -> DVec3 {
-        to_f64(self.w)
+        Quad::widened(self.stiffness).xyz()
     }
 
     /// H·d.
     #[inline(always)]
-    pub(super) fn times(&self, d: DVec3) -> DVec3 {
-        let w = self.along();
-        d * f64::from(self.alpha) + w * w.dot(&d)
+    pub(super) fn times(&self, d: Quad) -> Quad {
+        let w = Quad::widened(self.stiffness);
+        d * w.fourth() + w * w.dot(d)
     }
 }
 
@@ -322,7 +332,7 @@ pub(super) fn linearise(
             let (pull, alpha, w) =
                 if pulls.sound[at % LANES] { pulls.at(at % LANES) } else { link.degenerate_pull(x, a, particle) };
             at += 1;
-            *record = Record { other: link.other, alpha: alpha as f32, w: to_f32(w) };
+            *record = Record::new(link.other, alpha, w);
             let h = [alpha + w.x * w.x, w.x * w.y, w.x * w.z, alpha + w.y * w.y, w.y * w.z, alpha + w.z * w.z];
             sum.add(-pull, h);
             if index < inside.len() {

@@ -115,6 +115,8 @@ pub(super) struct Solved {
     pub(super) enough: f64,
     /// Depth of the deepest contact that sank beyond the accepted depth, metres below its gap; 0 without any.
     pub(super) unmet: f64,
+    /// Whether surfaces of such a contact went through each other.
+    pub(super) passed: bool,
     /// Depth of the deepest contact detected at the end, including ones that were not solved for, metres below its
     /// gap.
     pub(super) deepest: f64,
@@ -170,6 +172,8 @@ pub(super) struct StageSolver {
     /// pieces are neither pinned nor in contact.
     pub(super) groups: Vec<Option<u32>>,
     pub(super) free_pieces: Vec<bool>,
+    /// Whether the frame took so many iterations that descents give up sooner.
+    pub(super) hurried: bool,
 }
 
 impl StageSolver {

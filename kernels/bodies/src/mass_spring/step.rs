@@ -276,6 +276,7 @@ pub(super) fn sum(a: Solved, b: Solved) -> Solved {
         failed: a.failed || b.failed,
         enough: a.enough.max(b.enough),
         unmet: b.unmet,
+        passed: b.passed,
         deepest: b.deepest,
     }
 }

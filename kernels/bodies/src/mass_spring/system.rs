@@ -8,6 +8,7 @@
 use super::body::SoftBody;
 use super::springs::{Record, Sums};
 use numerics::adjacency::Adjacency;
+use numerics::quad::Quad;
 use numerics::rank_one::RankOneTerms;
 use numerics::simd::{Path, kernel};
 use numerics::vector::DVec3;
@@ -40,12 +41,12 @@ pub(super) struct System {
 
 impl System {
     /// Writes A·p to `out` and returns pᵀAp. `p` is 0 at pinned particles.
-    pub(super) fn apply(&mut self, body: &SoftBody, p: &[DVec3], out: &mut [DVec3]) -> f64 {
+    pub(super) fn apply(&mut self, body: &SoftBody, p: &[Quad], out: &mut [Quad]) -> f64 {
         let clusters = &body.order.clusters;
         self.regions.measure(p);
         self.transient.measure(p);
         let system = &*self;
-        clusters.sum(out, |cluster, out: &mut [DVec3]| {
+        clusters.sum(out, |cluster, out: &mut [Quad]| {
             apply_in_cluster(Path::chosen(), system, &body.adjacency, clusters.range(cluster), p, out)
         })
     }
@@ -69,8 +70,8 @@ kernel! {
         system: &System,
         adjacency: &Adjacency,
         particles: std::ops::Range<usize>,
-        p: &[DVec3],
-        out: &mut [DVec3],
+        p: &[Quad],
+        out: &mut [Quad],
     ) -> f64 = apply_in_cluster_body;
 }
 
@@ -79,14 +80,13 @@ fn apply_in_cluster_body(
     system: &System,
     adjacency: &Adjacency,
     particles: std::ops::Range<usize>,
-    p: &[DVec3],
-    out: &mut [DVec3],
+    p: &[Quad],
+    out: &mut [Quad],
 ) -> f64 {
-    let (regions, transient) = (!system.regions.is_empty(), !system.transient.is_empty());
     let first = particles.start;
-    out.fill(DVec3::zeros());
-    let mut sum = 0.0;
-    for particle in particles {
+    out.fill(Quad::default());
+    // One loop for each kind of term: beside single components the compiler would not keep vectors in registers.
+    for particle in particles.clone() {
         let mine = p[particle];
         let mut total = out[particle - first] + mine * system.inertia[particle];
         let [inside, across] = adjacency.of(particle, &system.records);
@@ -99,21 +99,29 @@ fn apply_in_cluster_body(
         for record in across {
             total += record.times(mine - p[record.other as usize]);
         }
-        if system.held[particle] {
-            out[particle - first] = DVec3::zeros();
-            continue;
-        }
-        if !system.blocks.is_empty() {
-            total += times(&system.blocks[particle], mine);
-        }
-        if regions {
-            total += system.regions.push(particle);
-        }
-        if transient {
-            total += system.transient.push(particle);
-        }
         out[particle - first] = total;
-        sum += mine.dot(&total);
+    }
+    if !system.blocks.is_empty() {
+        for particle in particles.clone() {
+            let block = &system.blocks[particle];
+            if *block != [0.0; 6] {
+                out[particle - first] += Quad::new(times(block, p[particle].xyz()));
+            }
+        }
+    }
+    for terms in [&system.regions, &system.transient] {
+        if !terms.is_empty() {
+            for particle in particles.clone() {
+                out[particle - first] += terms.push(particle);
+            }
+        }
+    }
+    let mut sum = 0.0;
+    for (particle, out) in particles.zip(out) {
+        if system.held[particle] {
+            *out = Quad::default();
+        }
+        sum += p[particle].dot(*out);
     }
     sum
 }
