@@ -3,18 +3,19 @@
 //! It is all that the next step depends on, and any format that keeps numbers keeps it exactly: a liquid resumed from it
 //! has the same bits.
 
+mod outside;
 #[cfg(test)]
 mod tests;
 
 use numerics::parallel;
-use numerics::vector::{Vec3, add, dot, scale, sub, unit};
+use numerics::vector::{Vec3, dot, scale};
 use serde::{Deserialize, Serialize};
 
 use crate::extract::{Placement, QuadMesh, extract_with};
-use crate::level_set::{BAND, Distance, Flow, Held, LevelSet, PhiChange, PhiSampler, PhiView, Sides, outward};
+use crate::level_set::{BAND, Distance, Flow, Held, LevelSet, PhiChange, PhiView, Sides};
 use crate::markers::{FARTHEST, Marker, Markers};
 use crate::rows::{Cell, CellRows, Periods};
-use crate::step::{Domain, Moving, Surface};
+use crate::step::{Domain, Moving, Surface, Swelling};
 
 /// Images beyond a periodic side, besides those that move in, so that φ in the band is that of a surface without an end.
 const IMAGES: i32 = 8;
@@ -25,32 +26,8 @@ const INSIDE: f32 = 1.0;
 /// Cosine between the normals of a marker and of a thin solid from which it faces a side.
 const FACING: f32 = 0.5;
 
-/// Thickness of a film on a solid, in surface cells, from which a mesh of these cells shows it without holes: more than the
-/// diagonal of a cell.
-const FILM: f32 = 1.8;
-
-/// How much larger φ must be a cell farther from the solid for a place to count as a film on it: at the first value it does
-/// not, from the second on it does fully. φ rises by 1 over an even film, by a half in a groove where lobes met, and hardly
-/// at all where a surface meets the solid at a right angle.
-const RISE: [f32; 2] = [0.2, 0.5];
-
-/// The same where only even films count: beside a shore, where the surface of a pool meets the solid, and on a thin solid,
-/// where other surfaces may belong to liquid on its far side.
-const RISE_OF_EVEN: [f32; 2] = [0.8, 0.95];
-
-/// How much larger φ is a cell farther out of a solid from which on it is no distance: what is in the solid then belongs to its
-/// other side, up to the middle of a wall that has moved since. Of a thin solid, it does where φ is not below 0 on its surface.
-const STEEP: f32 = 1.5;
-
-/// Height, in surface cells, of a place that is outside the solid where a side of it is as close as its distance says.
-const CLEAR: f32 = 0.5;
-
-/// How far to look for a shore, in surface cells, towards where liquid gets thinner: at a shore the solid is dry there, in a
-/// groove it is not.
-const BESIDE: f32 = 3.0;
-
-/// Distance, in surface cells, that films on both sides of a thin solid keep from its middle.
-const APART: f32 = 0.4;
+/// |φ|, in solver cells, up to which it swells.
+const SWELLING: f32 = 3.0;
 
 /// Points that one thread moves at a time.
 const CHUNK: usize = 512;
@@ -140,46 +117,6 @@ impl MarkedSurface {
         self.meshed(self.view_of(clipped.as_deref()), solid, |_, _| ()).0
     }
 
-    /// φ of surface cells, positive in a solid, but for films on it that are thinner than [`FILM`] cells: they reach into
-    /// the solid as far as they are too thin for cells to show, so that their surface has no holes.
-    pub fn phi_outside(&self, solid: &Distance<'_>) -> Vec<f32> {
-        let (size, view) = (self.resolution as f32, self.set.view());
-        let distance = |at: Vec3| size * solid(scale(at, 1.0 / size));
-        let start = || PhiSampler::new(view);
-        let [clipped] = view.rows.tabulate_with(start, |sampler, cell, n| {
-            let (at, phi) = (cell.map(|x| x as f32 + 0.5), view.phi[n]);
-            if phi >= BAND {
-                return [BAND];
-            }
-            let height = distance(at);
-            let thickness = height - phi;
-            let mut depth = 0.0;
-            if (0.0..FILM).contains(&thickness)
-                && height.abs() < 2.0 * FILM
-                && let Some(normal) = outward(&distance, at)
-            {
-                // Over a film φ rises with the height; where a surface meets the solid it does not.
-                let rise = sampler.at(add(at, normal)) - phi;
-                let inside = -distance(sub(at, scale(normal, height + FILM)));
-                let is_thin = inside < 0.5 * FILM;
-                let is_even = is_thin || is_shore(&distance, sampler, at, normal);
-                let [least, most] = if is_even { RISE_OF_EVEN } else { RISE };
-                let mut share = ((rise - least) / (most - least)).clamp(0.0, 1.0);
-                if share > 0.0 && height < 0.0 {
-                    let is_other_side = if is_thin { phi >= rise * height } else { rise > STEEP };
-                    // In a corner no side is as close as the distance says.
-                    let is_corner = || distance(add(at, scale(normal, CLEAR - height))) < 0.5 * CLEAR;
-                    share = if is_other_side || is_corner() { 0.0 } else { share };
-                }
-                let wanted = share * (FILM - thickness);
-                // Half the thickness of the solid, where that is less than a film reaches.
-                depth = wanted.min(0.5 * (FILM + inside) - APART).max(0.0);
-            }
-            [phi.max(-height - depth).min(BAND)]
-        });
-        clipped
-    }
-
     /// The mesh of one of its views, what is in a solid moved onto that, and what `of` makes of the cells inside and outside that
     /// each quad separates.
     pub(crate) fn meshed<T: Send>(
@@ -194,22 +131,6 @@ impl MarkedSurface {
         }
         mesh.bulge(&view);
         (mesh, made)
-    }
-
-    /// Moves points of a mesh in surface cells that are in a solid onto it.
-    fn put_outside(&self, mesh: &mut QuadMesh, solid: &Distance<'_>) {
-        let size = self.resolution as f32;
-        let distance = |at: Vec3| size * solid(scale(at, 1.0 / size));
-        parallel::for_each(mesh.points.chunks_mut(CHUNK), |_, points| {
-            for point in points {
-                let height = distance(*point);
-                if height < 0.0
-                    && let Some(normal) = outward(&distance, *point)
-                {
-                    *point = add(*point, scale(normal, -height));
-                }
-            }
-        });
     }
 
     /// The surface cells with another φ, where there is one.
@@ -315,6 +236,21 @@ impl Surface for MarkedSurface {
         self.restrict();
     }
 
+    fn swell(&mut self, swelling: &Swelling<'_>) {
+        let (size, unit) = (self.resolution as f32, 1.0 / self.resolution as f32);
+        let start = || swelling.reader();
+        let phi = self.set.phi();
+        let [cells] = self.set.rows().tabulate_with(start, |by, cell, at| {
+            let is_near = phi[at].abs() < SWELLING * size;
+            [if is_near { size * by(scale(cell.map(|x| x as f32 + 0.5), unit)) } else { 0.0 }]
+        });
+        let points = &self.markers.markers;
+        let markers =
+            parallel::tabulate_with(points.len(), CHUNK, start, |by, n| size * by(scale(points[n].point, unit)));
+        self.set.lower(&cells);
+        self.markers.shift(&markers);
+    }
+
     fn meet(&mut self, solid: &Distance<'_>) {
         let (size, unit) = (self.resolution as f32, 1.0 / self.resolution as f32);
         let scaled = |point: Vec3| size * solid(scale(point, unit));
@@ -343,6 +279,11 @@ impl Surface for MarkedSurface {
         let scaled = |point: Vec3, phi: f32| size * change(scale(point, unit), phi * unit);
         self.among_images(0.0, |markers, set| markers.change(set, low, high, &scaled));
         self.restrict();
+    }
+
+    fn volume(&self, low: Cell, high: Cell, solid: Option<&Distance<'_>>) -> f64 {
+        let [low, high] = [low, high].map(|corner| corner.map(|x| x.saturating_mul(self.resolution)));
+        self.volume_within(low, high, solid) / f64::from(self.resolution.pow(3))
     }
 
     fn edit_attributes(&mut self, edit: &(dyn Fn(Vec3, &mut [f32]) + Sync)) {
@@ -378,14 +319,6 @@ impl Flow for Scaled<'_> {
     fn solid_way(&self) -> f32 {
         self.flow.solid_way() * self.size
     }
-}
-
-/// Whether the solid is dry [`BESIDE`] cells from a place, where the liquid on it gets thinner.
-fn is_shore(solid: &Distance<'_>, sampler: &mut PhiSampler<'_>, at: Vec3, normal: Vec3) -> bool {
-    let (_, gradient) = sampler.gradient(at);
-    let Some(along) = unit(sub(gradient, scale(normal, dot(gradient, normal)))) else { return false };
-    let beside = add(at, scale(along, BESIDE));
-    sampler.at(sub(beside, scale(normal, solid(beside)))) >= 0.0
 }
 
 /// The cells `by` times larger that hold one of `rows`.

@@ -2,11 +2,13 @@
 //!
 //! After the surface moved, sources fill what is missing of their shapes as far as their rates allow, and sinks without a
 //! rate empty theirs. What a rate asks for beyond that becomes divergence of the liquid cells in the shape, which moves the
-//! surface in the next substep. The volumes are those that the level set shows before and after.
+//! surface in the next substep. The volumes are those that the level set shows before and after; what a sink cuts out at once is
+//! that which the mesh shows, where it is as little as a film on a solid.
 
 use numerics::vector::{Vec3, largest, length, scale};
 
 use crate::carried::{Filled, MaterialPoints};
+use crate::level_set::Distance;
 use crate::rows::{Cell, CellRows};
 use crate::step::domain::Obstacle;
 use crate::step::motion::{LiquidCells, Motion};
@@ -229,9 +231,9 @@ impl<'a> Exchange<'a> {
         if empties {
             if cells.takes(&phi) {
                 let [low, high] = cells.bounds();
+                let held = self.volume(surface, &cells);
                 surface.change(low, high, &cells.emptied());
-                let left = cells.volume(&cells.level_set(&surface.view()));
-                account.cut((cells.volume(&phi) - left) * self.cell_volume());
+                account.cut(held - self.volume(surface, &cells));
             }
             return None;
         }
@@ -265,6 +267,14 @@ impl<'a> Exchange<'a> {
 
     fn cells(&self, shape: SourceShape<'a>) -> Option<ShapeCells<'a>> {
         ShapeCells::new(shape, &self.settings.domain, self.solid, self.span.times[1])
+    }
+
+    /// The volume in cells, m³, but for a constant.
+    fn volume(&self, surface: &dyn Surface, cells: &ShapeCells<'_>) -> f64 {
+        let [low, high] = cells.bounds();
+        let distance = self.solid.map(|solid| move |point: Vec3| solid.distance(point));
+        let solid = distance.as_ref().map(|distance| distance as &Distance<'_>);
+        surface.volume(low, high, solid) * self.cell_volume()
     }
 
     fn seconds(&self) -> f64 {

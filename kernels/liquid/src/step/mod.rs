@@ -54,6 +54,7 @@ mod tests;
 mod turned;
 
 pub use balls::LiquidBall;
+pub use continuity::Swelling;
 pub use domain::{Domain, Solid, Wall};
 pub use motion::Motion;
 pub use outflow::Outflow;

@@ -4,6 +4,7 @@ use numerics::vector::{Vec3, add, length, scale, sub};
 
 use crate::level_set::{Distance, Held, PhiChange, PhiView, far_from_surface, held};
 use crate::rows::{Cell, Periods};
+use crate::step::continuity::Swelling;
 use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
 use crate::step::first::begin;
@@ -53,6 +54,9 @@ pub trait Surface {
     /// Moves by a flow that moves nothing in the liquid farther than `reach` cells.
     fn advance(&mut self, flow: &Moving<'_>, reach: f32);
 
+    /// Moves outward; [`Surface::advance`] follows. A surface may do without, and change its volume.
+    fn swell(&mut self, _swelling: &Swelling<'_>) {}
+
     /// Continues the liquid into a solid that it touches, and takes it out of the rest of the solid, which would leave it
     /// behind as it moves on. `solid` is the distance from it, in cells, negative inside. A surface may do without.
     fn meet(&mut self, _solid: &Distance<'_>) {}
@@ -60,6 +64,10 @@ pub trait Surface {
     /// Changes φ of the cells `low` ≤ cell < `high` to what `change` makes of a place in them and φ there, both in cells;
     /// the result need be a distance only where it is next to 0.
     fn change(&mut self, low: Cell, high: Cell, change: &PhiChange<'_>);
+
+    /// The volume between two corners, ÷ cell³, without what is in a solid, but for a constant that depends on what is beyond
+    /// them: the difference between two is that of the liquid.
+    fn volume(&self, low: Cell, high: Cell, solid: Option<&Distance<'_>>) -> f64;
 
     /// Changes the attributes of points on it to what `edit` makes of their places, in cells, and of them. A surface may do
     /// without.
@@ -164,6 +172,11 @@ pub(super) fn substep(
     let left_domain = outflow.iter().map(|outflow| outflow.volume).sum();
     motion.outflow.extend(outflow);
     motion.carry(&flow, surface.view(), settings);
+    if std::env::var("NOSW").is_err()
+        && let Some(swelling) = Swelling::of(&flow, &surface.view(), &settings.domain)
+    {
+        surface.swell(&swelling);
+    }
     surface.advance(&flow, reach);
     if let Some(solid) = solid {
         surface.meet(&|point| solid.distance(point));

@@ -69,6 +69,13 @@ impl Surface for PlainLevelSet {
         self.phi = distances(&rows, &phi);
         self.rows = rows;
     }
+
+    fn volume(&self, low: Cell, high: Cell, solid: Option<&Distance<'_>>) -> f64 {
+        let rows = self.rows.clipped(low, high);
+        let phi = rows.resampled(&self.rows, &self.phi, BAND);
+        let open = |cell: Cell| solid.map_or(1.0, |solid| (0.5 + solid(Site::Centre.of(cell))).clamp(0.0, 1.0));
+        rows.iter().zip(phi).fold(0.0, |sum, (cell, phi)| sum + f64::from((0.5 - phi).clamp(0.0, 1.0) * open(cell)))
+    }
 }
 
 /// A surface that stays where it is.
@@ -91,6 +98,10 @@ impl Surface for Still {
 
     fn change(&mut self, low: Cell, high: Cell, change: &PhiChange<'_>) {
         self.0.change(low, high, change);
+    }
+
+    fn volume(&self, low: Cell, high: Cell, solid: Option<&Distance<'_>>) -> f64 {
+        self.0.volume(low, high, solid)
     }
 }
 
