@@ -6,7 +6,7 @@
 
 Cooks the reference of the study and each of its runs with `convect cook --format json`, computes mean, p99 and max of its norm by
 itself, and compares them with those that the study stored: no more than 1e-6 apart, relative to the larger, unless both are below
-1e-12. `--set` are the study's own. Needs no library. Meshes must be of triangles and convex quads;
+1e-12. `--set` are the study's own. Needs no library. Meshes must be of triangles and quads;
 distances between surfaces are found by trying all triangles, so keep scenes small.
 """
 
@@ -90,18 +90,39 @@ def polylines(part):
     return lines
 
 
+def second_to_fourth(corners):
+    """Whether the line from the second to the fourth corner of a quad is inside it, seen along the axis that it faces most."""
+    normal = [0.0, 0.0, 0.0]
+    for k, a in enumerate(corners):
+        b = corners[(k + 1) % 4]
+        for axis in range(3):
+            u, v = (axis + 1) % 3, (axis + 2) % 3
+            normal[axis] += (a[u] - b[u]) * (a[v] + b[v])
+    axis = max(range(3), key=lambda axis: abs(normal[axis]))
+    u, v = (axis + 1) % 3, (axis + 2) % 3
+    side = 1 if normal[axis] > 0 else -1
+
+    def turns_left(a, b, c):
+        return side * ((b[u] - a[u]) * (c[v] - a[v]) - (b[v] - a[v]) * (c[u] - a[u])) > 0
+
+    a, b, c, d = corners
+    return turns_left(d, a, b) and turns_left(b, c, d)
+
+
 def triangles(name, part, fans=False):
     if name == "mesh":
-        found, at = [], 0
+        found, at, points = [], 0, rows(part["points"])
         for count in part["counts"]:
             face = part["indices"][at : at + count]
             at += count
             if count > 4:
                 sys.exit("the mesh has polygons of more than four corners")
             if count == 4:
-                # A surface is split from the second to the fourth corner, a volume from the first to the third.
+                # A surface is split from the second to the fourth corner where that lies inside, a volume from the first to
+                # the third.
                 a, b, c, d = face
-                found += [(a, b, c), (a, c, d)] if fans else [(d, a, b), (d, b, c)]
+                first = fans or not second_to_fourth([points[k] for k in face])
+                found += [(a, b, c), (a, c, d)] if first else [(d, a, b), (d, b, c)]
             else:
                 found.append(tuple(face))
         return found
