@@ -78,9 +78,9 @@ impl Motion {
     }
 }
 
-/// By how far a surface moves outward beside its flow, so that liquid which that presses together in the cells next to the
-/// liquid stays liquid, and none comes of what it pulls apart. [`Motion::balanced`] leaves such cells where all around is liquid, as in a crease
-/// that closes, and where more is missing than it may change.
+/// How far a surface moves outward, in addition to its flow. Where the flow presses liquid together in the cells next to the
+/// liquid, the surface moves outward by that volume; where it pulls liquid apart, inward. [`Motion::balanced`] leaves such
+/// cells where all six faces are known, as in a crease that closes, and where more is missing than it may change.
 pub struct Swelling<'a> {
     rows: &'a CellRows,
     /// Cells, at the middle of each of `rows`.
@@ -90,7 +90,7 @@ pub struct Swelling<'a> {
 }
 
 impl<'a> Swelling<'a> {
-    /// Of what `flow` does to the liquid of `view`; `None` where it does nothing of the kind.
+    /// The swelling that keeps the volume of the liquid of `view` in `flow`; `None` where nothing is pressed together or pulled apart.
     pub(super) fn of(flow: &Moving<'a>, view: &PhiView<'_>, domain: &Domain) -> Option<Self> {
         let (rows, faces, periods) = (flow.velocity.rows(), flow.velocity.faces(), domain.periods());
         // What of each cell's liquid has to go elsewhere, ÷ the area of the surface around it.
@@ -108,6 +108,7 @@ impl<'a> Swelling<'a> {
                 let Some(cell_faces) = CellFaces::of(finder, cell, at, domain) else { return [0.0] };
                 let height = flow.solid.map_or(f32::MAX, |solid| solid.distance(Site::Centre.of(cell)));
                 let open = (0.5 + height).clamp(0.0, 1.0);
+                // Through whole faces: the surface follows a velocity that is interpolated as if there were no solid.
                 let inflow = -cell_faces.outflow(faces) * flow.step * open;
                 if inflow.abs() < LEAST {
                     return [0.0];
