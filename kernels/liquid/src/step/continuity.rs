@@ -97,12 +97,8 @@ impl<'a> Swelling<'a> {
         let [outward] = rows.tabulate_with(
             || (Finder::new(rows), Finder::new(view.rows)),
             |(finder, phis), cell, at| {
-                let phi = |[x, y, z]: Cell| {
-                    let near = periods.home([cell[0] + x, cell[1] + y, cell[2] + z]);
-                    let inner = [0, 1, 2].map(|axis| near[axis].clamp(domain.low[axis], domain.high[axis] - 1));
-                    phis.find(inner).map_or(view.outside, |at| view.phi[at])
-                };
-                if !(-LEAST_DEPTH..1.0).contains(&phi([0; 3])) {
+                let phi = phis.find(inner(domain, cell)).map_or(view.outside, |at| view.phi[at]);
+                if !(-LEAST_DEPTH..1.0).contains(&phi) {
                     return [0.0];
                 }
                 let Some(cell_faces) = CellFaces::of(finder, cell, at, domain) else { return [0.0] };
@@ -113,7 +109,7 @@ impl<'a> Swelling<'a> {
                 if inflow.abs() < LEAST {
                     return [0.0];
                 }
-                let around = std::array::from_fn(|n| phi(offset(n, 5)));
+                let around = phi_around(view, domain, cell);
                 [inflow * fullness(&around) / area(&around).max(LEAST_AREA)]
             },
         );
@@ -208,6 +204,33 @@ impl CellFaces {
 /// To the n-th of `size`³ cells from the one in their middle, x fastest.
 fn offset(n: usize, size: usize) -> Cell {
     [n % size, n / size % size, n / size / size].map(|at| at as i32 - size as i32 / 2)
+}
+
+/// The cell of the domain that a cell repeats, or is next to.
+fn inner(domain: &Domain, cell: Cell) -> Cell {
+    let home = domain.periods().home(cell);
+    [0, 1, 2].map(|axis| home[axis].clamp(domain.low[axis], domain.high[axis] - 1))
+}
+
+/// φ around a cell; beyond the domain that of [`inner`].
+fn phi_around(view: &PhiView<'_>, domain: &Domain, cell: Cell) -> Neighbours {
+    let along: [Cell; 5] = std::array::from_fn(|n| inner(domain, cell.map(|x| x + n as i32 - 2)));
+    let (first, last) = (along[0][0], along[4][0]);
+    let mut phi = [view.outside; 125];
+    for (n, row) in phi.chunks_exact_mut(5).enumerate() {
+        let [y, z] = [along[n % 5][1], along[n / 5][2]];
+        let spans = view.rows.row(y, z);
+        let span = |x: i32| spans.get(spans.partition_point(|span| span.end <= x)).filter(|span| span.start <= x);
+        match span(first) {
+            Some(span) if last == first + 4 && last < span.end => row.copy_from_slice(&view.phi[span.at(first)..][..5]),
+            _ => {
+                for (phi, [x, ..]) in row.iter_mut().zip(along) {
+                    *phi = span(x).map_or(view.outside, |span| view.phi[span.at(x)]);
+                }
+            }
+        }
+    }
+    phi
 }
 
 /// The area, ÷ cell², of the surface that moves as the 3³ cells in the middle do: the change of fullness over each face of
