@@ -67,8 +67,9 @@ pub(super) fn begin(
     let materials = motion.materials_of(&cells, surface.view(), &settings.domain, own.map(|own| own as f32));
     motion.materials = points;
     let materials = Materials::new(own, materials, settings, seconds);
-    let pull = pulled.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
-    let projection = Projection { settings, cells: &cells, materials, solid, imposed: &[], speed, pull, seconds };
+    let (cut, imposed) = (&[], &[]);
+    let projection =
+        Projection { settings, cells: &cells, materials, solid, cut, imposed, speed, gravity: pulled, seconds };
     let report = projection.apply(&still, &mut [], &mut faces, motion);
     let change = resampled(motion.rows(), &cells.rows, &faces);
     let gained = |axis: usize| change[axis].iter().zip(&along[axis]).map(|(change, along)| change - along).collect();

@@ -238,6 +238,9 @@ pub(super) fn hold_walls(domain: &Domain, rows: &CellRows, faces: &mut FaceField
     }
 }
 
+/// Distance from a solid, in cells, up to which a face is on its surface.
+const FLUSH: f32 = 1e-3;
+
 /// On faces inside a solid, takes away the part that flows into or out of it.
 fn slide(rows: &CellRows, faces: &FaceFields<f32>, solid: Obstacle<'_>) -> FaceFields<f32> {
     rows.tabulate_with(
@@ -246,7 +249,7 @@ fn slide(rows: &CellRows, faces: &FaceFields<f32>, solid: Obstacle<'_>) -> FaceF
             [0, 1, 2].map(|axis| {
                 let own = faces[axis][at];
                 let point = Site::FACES[axis].of(cell);
-                if solid.distance(point) >= 0.0 {
+                if solid.distance(point) > FLUSH {
                     return own;
                 }
                 let Some(normal) = solid.normal(point) else { return own };

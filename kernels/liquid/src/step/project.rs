@@ -9,7 +9,7 @@ use crate::rows::CellRows;
 use crate::stencil::Stencil;
 use crate::step::domain::{Domain, Obstacle};
 use crate::step::exchange::Imposed;
-use crate::step::force::{Slopes, pressed};
+use crate::step::force::{CutCell, pressed, rested};
 use crate::step::motion::{Guess, LiquidCells, Motion};
 use crate::step::pour::{Pour, pour};
 use crate::step::{LiquidReport, LiquidSettings, ViscousSolve};
@@ -24,11 +24,13 @@ pub(super) struct Projection<'a> {
     pub cells: &'a LiquidCells,
     pub materials: Materials,
     pub solid: Option<Obstacle<'a>>,
+    /// Those that the solid cuts, where the force on it is wanted.
+    pub cut: &'a [CutCell],
     pub imposed: &'a [Imposed],
     /// The speed of the liquid, m/s.
     pub speed: f64,
     /// What gravity adds to it, m/s.
-    pub pull: f64,
+    pub gravity: [f64; 3],
     /// The length of the substep.
     pub seconds: f64,
 }
@@ -93,16 +95,24 @@ impl Projection<'_> {
         motion: &mut Motion,
     ) -> LiquidReport {
         let solve = self.settings.coupling.solve(self.materials.largest(self.cells));
-        let report = match solve {
+        let mut report = match solve {
             ViscousSolve::Coupled => {
                 let likely = motion.with_last_gain(self.cells, before, self.seconds);
                 self.by_pressure_and_viscosity(&likely, pours, faces, &mut motion.guess)
             }
             ViscousSolve::Decoupled => self.by_pressure_then_viscosity(pours, faces, &mut motion.guess),
-            ViscousSolve::LeftOut => self.by_pressure(self.speed.max(self.pull), pours, faces, &mut motion.guess),
+            ViscousSolve::LeftOut => self.by_pressure(self.speed.max(self.pull()), pours, faces, &mut motion.guess),
         };
         pours.iter().for_each(|pour| pour.enter(motion, self.seconds));
+        let density = self.materials.of_cells.as_ref().map(|[_, density]| &density[..]);
+        let rested = self.force(rested(self.cut, self.gravity, density));
+        report.solid_force.iter_mut().zip(rested).for_each(|(force, rested)| *force += rested);
         LiquidReport { viscous_substeps: u32::from(solve != ViscousSolve::LeftOut), ..report }
+    }
+
+    /// The largest component of what gravity adds, m/s.
+    pub(super) fn pull(&self) -> f64 {
+        self.gravity.iter().fold(0.0, |most, g| most.max(g.abs()))
     }
 
     /// Drives the divergence out of a velocity. `scale`: the speed that errors are measured against, m/s.
@@ -126,14 +136,14 @@ impl Projection<'_> {
         let stop = Stop { flow: self.flow_tolerance(scale), iterations: self.settings.max_iterations };
         let solved = solver.solve(&mut inflow, &mut q, stop);
         subtract_gradient(&solver, cells, density.as_ref(), &q, faces);
-        let force = self.solid.map(|solid| pressed(solid, &cells.rows, &cells.open, &solver, &q, Slopes::OfPressure));
+        let force = self.force(pressed(self.cut, &solver, &q));
         *guess = Guess { rows: solver.rows().clone(), q };
         let is_done = solved.flow <= stop.flow;
         LiquidReport {
             pressure_iterations: solved.iterations,
             pressure_residual: if scale > 0.0 { solved.flow / scale } else { 0.0 },
             solves_cut_short: u32::from(!is_done),
-            solid_force: self.force(force.unwrap_or_default()),
+            solid_force: force,
             ..self.report(solved.flow, [solved.unbalanced, poured])
         }
     }

@@ -1,11 +1,10 @@
 //! The end of a substep of a viscous liquid: pressure and viscosity act at once, or one after the other.
 
-use crate::pressure::face_densities;
 use crate::rows::CellRows;
 use crate::step::LiquidReport;
 use crate::step::domain::{Obstacle, Wall, share_outside};
 use crate::step::exchange::Imposed;
-use crate::step::force::{Slopes, pressed};
+use crate::step::force::pressed;
 use crate::step::motion::Guess;
 use crate::step::pour::{Pour, pour};
 use crate::step::project::{Projection, covered, net};
@@ -20,8 +19,6 @@ struct ViscousEquations {
     rows: CellRows,
     open: FaceFields<f32>,
     solid_velocity: Option<FaceFields<f32>>,
-    level_set: Vec<f32>,
-    density: Vec<f32>,
     solver: StokesSolver,
 }
 
@@ -51,12 +48,12 @@ impl Projection<'_> {
             slip: &|axis, cell| domain.slip(axis, cell, self.settings.slip),
             periods: domain.periods(),
         });
-        ViscousEquations { rows, open, solid_velocity, level_set, density, solver }
+        ViscousEquations { rows, open, solid_velocity, solver }
     }
 
     /// Thick liquid creeps far more slowly than gravity would have it.
     fn creep(&self) -> f64 {
-        self.speed.max(CREEP * self.pull)
+        self.speed.max(CREEP * self.pull())
     }
 
     /// Drives the divergence out of a velocity and lets viscosity act, both at once. `likely`: a first guess of the result.
@@ -68,7 +65,7 @@ impl Projection<'_> {
         guess: &mut Guess,
     ) -> LiquidReport {
         let equations = self.equations();
-        let ViscousEquations { rows, open, solver, .. } = &equations;
+        let ViscousEquations { solver, .. } = &equations;
         let [before, mut u] = [self.on_solver(&equations, faces, false), self.on_solver(&equations, likely, true)];
         let mut q = solver.rows().resampled(&guess.rows, &guess.q, 0.0);
         let scale = self.creep();
@@ -80,13 +77,11 @@ impl Projection<'_> {
         let mut inflow = equations.driven();
         let poured = pour(pours, solver.pressure(), self.settings.cell, &mut inflow);
         let solved = solver.solve(&before, &mut u, &mut q, &inflow, stop);
-        let force = self.solid.map(|solid| {
-            let mut force = self.viscous_impulse(&equations, &u, solid);
-            let lost = equations.lost(&before, &u);
-            let of_pressure = pressed(solid, rows, open, solver.pressure(), &q, Slopes::OfStress { lost: &lost });
-            force.iter_mut().zip(of_pressure).for_each(|(force, of_pressure)| *force += of_pressure);
-            force
-        });
+        let mut force = pressed(self.cut, solver.pressure(), &q);
+        if let Some(solid) = self.solid {
+            let of_viscosity = self.viscous_impulse(&equations, &u, solid);
+            force.iter_mut().zip(of_viscosity).for_each(|(force, of_viscosity)| *force += of_viscosity);
+        }
         self.take_over(&equations, &u, faces);
         *guess = Guess { rows: solver.rows().clone(), q };
         let is_done = solved.flow <= stop.flow && solved.velocity <= stop.velocity;
@@ -94,7 +89,7 @@ impl Projection<'_> {
             coupled_iterations: solved.iterations,
             coupled_residual: if scale > 0.0 { solved.velocity / scale } else { 0.0 },
             solves_cut_short: u32::from(!is_done),
-            solid_force: self.force(force.unwrap_or_default()),
+            solid_force: self.force(force),
             ..self.report(solved.flow, [solved.unbalanced, poured])
         }
     }
@@ -177,21 +172,6 @@ impl Projection<'_> {
 }
 
 impl ViscousEquations {
-    /// The momentum that the liquid at each free face loses to pressure and viscosity, ÷ reference density · volume, m/s;
-    /// 0 at others. On the solver's cells.
-    fn lost(&self, before: &FaceFields<f64>, u: &FaceFields<f64>) -> FaceFields<f64> {
-        let Self { rows, density, solver, .. } = self;
-        let density = face_densities(rows, &self.level_set, density);
-        std::array::from_fn(|axis| {
-            let density = solver.rows().resampled(rows, &density[axis], 1.0);
-            let lost = |at: usize| match solver.is_free(axis, at) {
-                true => f64::from(density[at]) * (before[axis][at] - u[axis][at]),
-                false => 0.0,
-            };
-            (0..density.len()).map(lost).collect()
-        })
-    }
-
     /// The net inflow of each liquid cell that solids drive, m/s.
     fn driven(&self) -> Vec<f64> {
         let Self { rows, open, solid_velocity, solver, .. } = self;

@@ -9,6 +9,7 @@ use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
 use crate::step::first::begin;
 use crate::step::flight::Flight;
+use crate::step::force::cut_cells;
 use crate::step::motion::{Gain, LiquidCells, Motion, largest_of};
 use crate::step::outflow::outflow;
 use crate::step::passed::passed_over;
@@ -204,14 +205,17 @@ pub(super) fn substep(
         moving.for_each(|(u, _)| *u += gravity[axis] as f32);
     }
 
-    let pull = gravity.iter().fold(0.0_f64, |most, g| most.max(g.abs()));
-    let speed = motion.largest_speed().max(exchanged.speed(settings.cell));
-    // Of liquid at rest without weight only solids say how fast it will be.
-    let speed = if speed.max(pull) > 0.0 { speed } else { cells.largest_solid_speed() };
     let own = [(around.viscosity)(middle), settings.density];
     let materials = motion.materials_of(&cells, surface.view(), &settings.domain, own.map(|own| own as f32));
     let materials = Materials::new(own, materials, settings, seconds);
-    let projection = Projection { settings, cells: &cells, materials, solid, imposed: &imposed, speed, pull, seconds };
+    let speed = motion.largest_speed().max(exchanged.speed(settings.cell));
+    let cut = solid.map_or_else(Vec::new, |solid| cut_cells(&settings.domain, &cells, solid));
+    let mut projection =
+        Projection { settings, cells: &cells, materials, solid, cut: &cut, imposed: &imposed, speed, gravity, seconds };
+    if speed.max(projection.pull()) == 0.0 {
+        // Of liquid at rest without weight only solids say how fast it will be.
+        projection.speed = cells.largest_solid_speed();
+    }
     let mut report = projection.apply(&before, &mut exchanged.pours, &mut faces, motion);
     cells.images.fill_each(&mut faces);
     report.substeps = 1;
