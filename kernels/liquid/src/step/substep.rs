@@ -173,9 +173,7 @@ pub(super) fn substep(
     let left_domain = outflow.iter().map(|outflow| outflow.volume).sum();
     motion.outflow.extend(outflow);
     motion.carry(&flow, surface.view(), settings);
-    if std::env::var("NOSW").is_err()
-        && let Some(swelling) = Swelling::of(&flow, &surface.view(), &settings.domain)
-    {
+    if let Some(swelling) = Swelling::of(&flow, &surface.view(), &settings.domain) {
         surface.swell(&swelling);
     }
     surface.advance(&flow, reach);
