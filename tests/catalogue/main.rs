@@ -13,6 +13,8 @@ mod vectors;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use tokens::{Token, tokens};
+
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -49,4 +51,17 @@ fn the_guide_for_authors_shows_the_node_that_is_compiled() {
         guide.contains(production.trim_end()),
         "the node in docs/writing_nodes.md differs from docs/examples/curve_helix.rs"
     );
+}
+
+/// Nodes and kernels compute the same wherever they run.
+#[test]
+fn no_result_depends_on_the_environment() {
+    let is_part = |name: &str| name == "tests" || name == "tests.rs" || name == "examples";
+    let is_other = |file: &Path| file.components().any(|part| part.as_os_str().to_str().is_some_and(is_part));
+    for folder in ["kernels", "nodes"] {
+        for (file, source) in sources(&root().join(folder)).into_iter().filter(|(file, _)| !is_other(file)) {
+            let reads = |tokens: &[Token]| tokens[0].is("env") && tokens[1] == Token::Colons;
+            assert!(!tokens(&source).windows(2).any(reads), "{} reads the environment", file.display());
+        }
+    }
 }
