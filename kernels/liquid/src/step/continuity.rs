@@ -105,12 +105,14 @@ impl<'a> Swelling<'a> {
                 let height = flow.solid.map_or(f32::MAX, |solid| solid.distance(Site::Centre.of(cell)));
                 let open = (0.5 + height).clamp(0.0, 1.0);
                 // Through whole faces: the surface follows a velocity that is interpolated as if there were no solid.
-                let inflow = -cell_faces.outflow(faces) * flow.step * open;
-                if inflow.abs() < LEAST {
+                let inflow = -cell_faces.outflow(faces) * flow.step;
+                if inflow.abs() * open < LEAST {
                     return [0.0];
                 }
                 let around = phi_around(view, domain, cell);
-                [inflow * fullness(&around) / area(&around).max(LEAST_AREA)]
+                // Liquid goes on in a solid.
+                let liquid = (fullness(&around) - (1.0 - open)).max(0.0);
+                [inflow * liquid / area(&around).max(LEAST_AREA)]
             },
         );
         let (mut by, finder, mut is_any) = (vec![0.0; rows.len()], Finder::new(rows), false);

@@ -1,6 +1,6 @@
 //! What moves with a liquid: its velocity, and what the next substep needs to know of the last.
 
-use numerics::vector::Vec3;
+use numerics::vector::{Vec3, add, scale};
 use serde::{Deserialize, Serialize};
 
 use crate::carried::{CellMaterials, MaterialPoints, Stir, TracerPoints};
@@ -241,7 +241,8 @@ pub(super) fn hold_walls(domain: &Domain, rows: &CellRows, faces: &mut FaceField
 /// Distance from a solid, in cells, up to which a face is on its surface.
 const FLUSH: f32 = 1e-3;
 
-/// On faces inside a solid, takes away the part that flows into or out of it.
+/// On faces inside a solid, takes away the part that flows into or out of it, and on the first ones turns it round: a velocity
+/// interpolated between these and the ones outside is then the solid's on its surface.
 fn slide(rows: &CellRows, faces: &FaceFields<f32>, solid: Obstacle<'_>) -> FaceFields<f32> {
     rows.tabulate_with(
         || Sampler::new(rows),
@@ -249,15 +250,22 @@ fn slide(rows: &CellRows, faces: &FaceFields<f32>, solid: Obstacle<'_>) -> FaceF
             [0, 1, 2].map(|axis| {
                 let own = faces[axis][at];
                 let point = Site::FACES[axis].of(cell);
-                if solid.distance(point) > FLUSH {
+                let depth = -solid.distance(point);
+                if depth < -FLUSH {
                     return own;
                 }
                 let Some(normal) = solid.normal(point) else { return own };
                 let own_velocity = solid.velocity(point);
-                let mut past =
-                    |other: usize| sampler.value(&faces[other], Site::FACES[other], point) - own_velocity[other];
-                let flow: f32 = (0..3).map(|other| normal[other] * past(other)).sum();
-                own - flow * normal[axis]
+                let mut outflow = |point: Vec3| -> f32 {
+                    let mut past =
+                        |other: usize| sampler.value(&faces[other], Site::FACES[other], point) - own_velocity[other];
+                    (0..3).map(|other| normal[other] * past(other)).sum()
+                };
+                let mut taken = outflow(point);
+                if FLUSH < depth && depth < 1.0 {
+                    taken += depth * outflow(add(point, scale(normal, depth + 1.0)));
+                }
+                own - taken * normal[axis]
             })
         },
     )

@@ -20,6 +20,13 @@ const HALF_DIAGONAL: f32 = 0.87;
 /// Depth to which a shape inside a solid is filled, in cells: φ on the solid's surface must not see the end.
 const INTO_SOLID: f32 = 2.0;
 
+/// Depth to which one is emptied, in cells: rounding would lift liquid that ends on the solid's surface out of it.
+const OUT_OF_SOLID: f32 = 0.25;
+
+/// Size of the fillet that is left where what is taken away meets a solid, in cells: the surface would round off a sharp edge,
+/// from nothing, and that would be taken in each substep.
+const FILLET: f32 = 2.0;
+
 /// Size of the least part that is filled beside liquid, where 0 is that which may be filled anywhere and −1 nothing.
 const LEAST_BESIDE: f32 = -0.95;
 
@@ -112,11 +119,16 @@ impl<'a> ShapeCells<'a> {
     /// φ with the shape taken away where it is not in a solid: what goes on inside one would be taken again and again.
     pub(super) fn emptied(&self) -> impl Fn(Vec3, f32) -> f32 + Sync {
         move |point, phi| {
-            let distance = self.distance(point);
-            match self.solid {
-                Some(solid) if -distance > phi => phi.max(solid.distance(point).min(-distance)),
-                _ => phi.max(-distance),
-            }
+            let side = -self.distance(point);
+            let left = match self.solid {
+                Some(solid) if side > phi => {
+                    let floor = solid.distance(point) + OUT_OF_SOLID;
+                    let rounded = (FILLET - (floor - side).abs()).max(0.0);
+                    floor.min(side) - rounded * rounded / (4.0 * FILLET)
+                }
+                _ => side,
+            };
+            phi.max(left)
         }
     }
 

@@ -29,6 +29,6 @@ fn gained(height: f32) -> f64 {
 fn a_drop_that_spreads_keeps_its_volume() {
     for height in [4.0, 3.74, 3.4] {
         let gained = gained(height);
-        assert!(gained.abs() < 0.02, "a plate at {height}: {gained}");
+        assert!(gained.abs() < 0.025, "a plate at {height}: {gained}");
     }
 }
