@@ -9,6 +9,7 @@
 //! inverted at rest is treated as its mirror image, and a flat one has no volume to preserve. Metres, seconds,
 //! kilograms.
 
+use super::coarse::Layout;
 use super::regions::Regions;
 use super::spacing::spacings;
 use super::tet_springs::{EDGES, edges, neighbours_of_missing};
@@ -132,6 +133,7 @@ pub struct SoftBody {
     /// Young's modulus of each of `tets`, times the share that is filled.
     pub(super) moduli: Vec<f64>,
     pub(super) regions: Regions,
+    pub(super) layout: Layout,
     /// Springs in fixed parts, for parallel loops.
     pub(super) spring_partition: Partition,
     /// Tetrahedra in fixed parts.
@@ -141,7 +143,7 @@ pub struct SoftBody {
     /// Index in the mesh of each of `tets`.
     kept: Vec<u32>,
     /// Number of springs that come from the mesh; explicit ones follow.
-    mesh_spring_count: usize,
+    pub(super) mesh_spring_count: usize,
     /// For each missing edge, the surface edges whose mean stiffness it takes.
     means: Vec<Vec<u32>>,
     /// Points that ride along, by the caller's indices.
@@ -218,11 +220,6 @@ impl SoftBody {
     /// Rest position of a particle, by the caller's index, metres.
     pub fn rest_point(&self, particle: usize) -> [f64; 3] {
         self.rest[self.order.index_of[particle] as usize].into()
-    }
-
-    /// Number of springs that come from the mesh; explicit ones follow.
-    pub fn mesh_spring_count(&self) -> usize {
-        self.mesh_spring_count
     }
 
     /// Mass of each particle, by the caller's index, kilograms.
@@ -415,13 +412,14 @@ impl SoftBody {
             })
             .collect();
         let ends: Vec<[u32; 2]> = ends.iter().map(|ends| ends.map(|end| order.index_of[end as usize])).collect();
-        let spacing = spacings(&order, &ends, &lengths);
         let rest: Vec<DVec3> = order.caller_of.iter().map(|caller| points[*caller as usize]).collect();
         let (kept, tets) = with_volume(mesh, &points, &order);
         let volumes: Vec<f64> = kept.iter().map(|tet| given[*tet as usize].volume).collect();
         let low = rest.iter().fold(DVec3::repeat(f64::INFINITY), |low, p| low.inf(p));
         let high = rest.iter().fold(DVec3::repeat(f64::NEG_INFINITY), |high, p| high.sup(p));
         let regions = Regions::new(&rest, &tets);
+        let adjacency = Adjacency::new(&order.clusters, &ends);
+        let layout = Layout::new(&order, &adjacency, &regions);
         let zeros = std::iter::repeat_n(0.0, mesh_spring_count);
         Ok(Self {
             stiffness: zeros.clone().chain(joints.iter().map(|spring| f64::from(spring.stiffness as f32))).collect(),
@@ -431,7 +429,9 @@ impl SoftBody {
             size: if count > 0 { (high - low).max() } else { 0.0 },
             mass: vec![1.0; count],
             moduli: vec![0.0; tets.len()],
-            adjacency: Adjacency::new(&order.clusters, &ends),
+            spacing: spacings(&layout, order.pieces.len(), &ends, &lengths),
+            layout,
+            adjacency,
             order,
             rest,
             ends,
@@ -444,7 +444,6 @@ impl SoftBody {
             means,
             riding: mesh.riding.to_vec(),
             mesh_spring_count,
-            spacing,
         })
     }
 }

@@ -143,8 +143,7 @@ impl Stepper<'_> {
         let body = self.context.body;
         let mut back = vec![DVec3::zeros(); body.order.pieces.len()];
         for contact in contacts.iter().filter(|contact| !contact.is_two_sided()) {
-            let (depth, piece) =
-                (-contact.clearance(&out, 0.0), self.solver.layout.piece_of(contact.particles[0] as usize));
+            let (depth, piece) = (-contact.clearance(&out, 0.0), body.layout.piece_of(contact.particles[0] as usize));
             if depth > FAR * body.size && depth > back[piece].norm() {
                 back[piece] = contact.normal * depth;
             }

@@ -80,7 +80,7 @@ impl StageSolver {
             let now = contact.load_at(x, 0.0);
             let mut last = usize::MAX;
             for (particle, weight) in contact.sides() {
-                let piece = self.layout.piece_of(particle);
+                let piece = body.layout.piece_of(particle);
                 let loads = &mut pieces[piece];
                 loads.net += contact.normal * (weight * now);
                 if piece != last {

@@ -6,7 +6,7 @@
 //! converge.
 
 use super::body::SoftBody;
-use super::coarse::{self, ClusterMotions, ContactFilters, Layout};
+use super::coarse::{self, ClusterMotions, ContactFilters};
 use super::conjugate_gradients::{Coarse, Limits, Reached};
 use super::contact::{ContactConstraint, ContactState};
 use super::external::{ExternalForces, Moment};
@@ -134,7 +134,6 @@ impl Solved {
 #[derive(Clone, Debug, Default)]
 pub(super) struct StageSolver {
     pub(super) system: System,
-    pub(super) layout: Layout,
     pub(super) volumes: Volumes,
     /// Whether `volumes` holds values for the positions evaluated next: a line search ends with evaluating the point
     /// it accepts.
@@ -190,7 +189,7 @@ impl StageSolver {
         };
         let regions = &body.regions;
         system.regions.set_topology(count, &regions.starts, &regions.particles, regions.partition());
-        Self { system, layout: Layout::new(body), r: vec![DVec3::zeros(); count], ..Self::default() }
+        Self { system, r: vec![DVec3::zeros(); count], ..Self::default() }
     }
 
     /// Starts a stage with step coefficient `a`. Dashpots measure changes of length and volume from the start of the
@@ -321,8 +320,8 @@ impl StageSolver {
         let mut target = self.momentum_target(stage, &right);
         self.correct_linear_momentum(stage, &target);
         coarse::offset_from_centroid(&body.order.clusters, x, &mut self.offset_from_centroid);
-        let filters = ContactFilters::new(&self.system, &self.layout);
-        let old = self.cached.factor.len() != self.layout.rows() || self.cached.iterations_since > OLD;
+        let filters = ContactFilters::new(&self.system, &body.layout);
+        let old = self.cached.factor.len() != body.layout.rows() || self.cached.iterations_since > OLD;
         if old || filters.change(&self.cached.filters) > CONTACTS_CHANGED {
             self.renew(body, filters);
         }
@@ -377,14 +376,14 @@ impl StageSolver {
             return first;
         }
         // The factor is too old to be useful.
-        self.renew(body, ContactFilters::new(&self.system, &self.layout));
+        self.renew(body, ContactFilters::new(&self.system, &body.layout));
         let share = (limits.share / first.share.max(limits.share)).min(1.0);
         Reached { start: first.start, ..solve(self, Limits { share, cap: CG_CAP, ..limits }) }
     }
 
     fn renew(&mut self, body: &SoftBody, filters: ContactFilters) {
         let motions = ClusterMotions { offset_from_centroid: &self.offset_from_centroid, filters: &filters };
-        let factor = Galerkin { layout: &self.layout, body, system: &self.system, motions }.factor();
+        let factor = Galerkin { body, system: &self.system, motions }.factor();
         self.cached = CachedCoarseFactor { factor, filters, ..CachedCoarseFactor::default() };
     }
 }
