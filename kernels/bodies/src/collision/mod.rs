@@ -22,6 +22,7 @@ mod obstacle;
 mod overlap;
 mod pair;
 mod piercing;
+mod solid;
 mod surface;
 mod vertex;
 
