@@ -74,8 +74,8 @@ pub struct Separation<'a> {
     pub seconds: f64,
 }
 
-/// The particles that are being pushed out of obstacles, by the indices of their skin and of the obstacle.
-type Pushed = BTreeMap<(usize, usize), Vec<u32>>;
+/// Which particles are being pushed out of obstacles, by the indices of their skin and of the obstacle.
+type Pushed = BTreeMap<(usize, usize), Vec<bool>>;
 
 /// Where bodies are, relative to what should keep them out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -292,14 +292,14 @@ impl CollisionScene<'_> {
         }
     }
 
-    /// Returns the particles that are pushed.
+    /// Returns which particles are pushed.
     fn out_of_obstacle(
         &self,
         query: &ContactQuery<'_>,
         overlap: &Overlap,
         other: &Obstacle,
         out: &mut Vec<Contact>,
-    ) -> Vec<u32> {
+    ) -> Vec<bool> {
         let first = &self.skins[overlap.skin];
         let normal = DVec3::from(overlap.direction);
         let [start, end] = query.times.map(|time| other.at(time));
@@ -321,7 +321,9 @@ impl CollisionScene<'_> {
             let ([a, b, c], [u, v, w]) = body.place(&solid, &exit, -normal);
             push(&exit, ([a, b, c, 0], [u, v, w, 0.0]), &[exit.point], &[1.0]);
         }
-        exits.iter().map(|exit| exit.point).collect()
+        let mut pushed = vec![false; query.from.len()];
+        exits.iter().for_each(|exit| pushed[exit.point as usize] = true);
+        pushed
     }
 
     /// Where contact points at `x` are at the end of the frame.

@@ -86,28 +86,13 @@ pub enum BodyError {
     /// A coordinate is NaN or infinite.
     #[error("point {0} is not finite")]
     Point(usize),
-    /// A tetrahedron, spring or riding point has a particle index out of range, or one of the first two a particle twice.
-    #[error("{what} {index} joins particles {particles:?}; expected distinct indices below {count}")]
-    Particles {
-        /// `tetrahedron`, `spring` or `riding point`.
-        what: &'static str,
-        /// Index of that element.
-        index: usize,
-        /// Its particles.
-        particles: Vec<u32>,
-        /// Number of particles.
-        count: usize,
-    },
-    /// A parameter of a spring or particle is negative or not finite.
-    #[error("`{what}` of {index} is {value}; expected a finite number, 0 or more")]
-    Number {
-        /// Name of the parameter.
-        what: &'static str,
-        /// Index of the spring or particle.
-        index: usize,
-        /// Its value.
-        value: f64,
-    },
+    /// A tetrahedron, spring or riding point, of an index, has a particle out of range, or one of the first two a particle
+    /// twice.
+    #[error("{0} {1} joins particles {2:?}; expected distinct indices below {3}")]
+    Particles(&'static str, usize, Vec<u32>, usize),
+    /// A parameter of the spring or particle of an index is negative or not finite.
+    #[error("`{0}` of {1} is {2}; expected a finite number, 0 or more")]
+    Number(&'static str, usize, f64),
     /// The total mass is zero.
     #[error("the body has no mass; expected at least one tet with a volume and a density above 0")]
     NoMass,
@@ -215,11 +200,6 @@ impl SoftBody {
     /// Rest length of each spring before any plastic flow or reset, metres.
     pub fn lengths(&self) -> &[f64] {
         &self.lengths
-    }
-
-    /// Rest position of a particle, by the caller's index, metres.
-    pub fn rest_point(&self, particle: usize) -> [f64; 3] {
-        self.rest[self.order.index_of[particle] as usize].into()
     }
 
     /// Mass of each particle, by the caller's index, kilograms.
@@ -373,12 +353,7 @@ impl SoftBody {
         mesh.missing.iter().enumerate().try_for_each(|(index, ends)| distinct("spring", index, ends, count))?;
         for (index, carrier) in mesh.riding.iter().enumerate() {
             if carrier.particles.iter().any(|particle| *particle as usize >= count) {
-                return Err(BodyError::Particles {
-                    what: "riding point",
-                    index,
-                    particles: carrier.particles.to_vec(),
-                    count,
-                });
+                return Err(BodyError::Particles("riding point", index, carrier.particles.to_vec(), count));
             }
             carrier.weights.iter().try_for_each(|weight| number("weight", index, weight.abs()).map(|_| ()))?;
         }
@@ -458,7 +433,7 @@ fn mean(values: &[f64]) -> f64 {
 }
 
 fn number(what: &'static str, index: usize, value: f64) -> Result<f64, BodyError> {
-    if value.is_finite() && value >= 0.0 { Ok(value) } else { Err(BodyError::Number { what, index, value }) }
+    if value.is_finite() && value >= 0.0 { Ok(value) } else { Err(BodyError::Number(what, index, value)) }
 }
 
 /// A stiffness rounded to f32, as forces store it, so that energies match forces exactly.
@@ -469,7 +444,7 @@ fn stiffness(index: usize, k: f64) -> Result<f64, BodyError> {
 fn distinct(what: &'static str, index: usize, particles: &[u32], count: usize) -> Result<(), BodyError> {
     let doubled = (1..particles.len()).any(|k| particles[..k].contains(&particles[k]));
     if doubled || particles.iter().any(|particle| *particle as usize >= count) {
-        return Err(BodyError::Particles { what, index, particles: particles.to_vec(), count });
+        return Err(BodyError::Particles(what, index, particles.to_vec(), count));
     }
     Ok(())
 }

@@ -9,11 +9,11 @@
 //! stiff bodies would tilt. For the same reason contacts that a direction pulls on stay. Nor between bodies: those that start
 //! inside each other come apart less evenly with it.
 
-use super::stage::{Stage, StageSolver};
+use super::stage::{BodySolver, Stage};
 use numerics::quad::Quad;
 use numerics::vector::DVec3;
 
-impl StageSolver {
+impl BodySolver {
     /// Adds the contacts that the direction `dx` from `x` closes to the linear system with the right-hand side `right`, and
     /// sets the residual `r` to that of `dx`. Returns false if there are none.
     ///

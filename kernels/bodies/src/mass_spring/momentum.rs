@@ -3,7 +3,7 @@
 
 use super::body::SoftBody;
 use super::contact::ContactMode;
-use super::stage::{Stage, StageSolver};
+use super::stage::{BodySolver, Stage};
 use numerics::pieces::pieces;
 use numerics::rotation::CayleyRotation;
 use numerics::vector::{DMat3, DVec3};
@@ -28,7 +28,7 @@ struct ObstacleContact {
     directions: Vec<DVec3>,
 }
 
-impl StageSolver {
+impl BodySolver {
     /// Finds the groups of pieces, joined by contacts with each other, that are not pinned; and which pieces have no
     /// contact.
     pub(super) fn find_free_groups(&mut self, stage: &Stage<'_>) {

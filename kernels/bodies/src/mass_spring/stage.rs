@@ -130,9 +130,9 @@ impl Solved {
     }
 }
 
-/// The linear system and buffers, kept between stages to avoid allocations; they do not affect results.
+/// Steps a body through frames. What it keeps between calls only saves allocations; it does not affect results.
 #[derive(Clone, Debug, Default)]
-pub(super) struct StageSolver {
+pub struct BodySolver {
     pub(super) system: System,
     pub(super) volumes: Volumes,
     /// Whether `volumes` holds values for the positions evaluated next: a line search ends with evaluating the point
@@ -175,8 +175,9 @@ pub(super) struct StageSolver {
     pub(super) hurried: bool,
 }
 
-impl StageSolver {
-    pub(super) fn new(body: &SoftBody) -> Self {
+impl BodySolver {
+    /// For `body`, whose topology must stay the same; its material may change.
+    pub fn new(body: &SoftBody) -> Self {
         let count = body.len();
         let mut system = System {
             records: vec![Record::default(); body.adjacency.incident.len()],
@@ -237,7 +238,7 @@ impl StageSolver {
             solved.set_residual(after);
             solved.failed |= after > RISE * before;
             let wanted = if newton.tolerance > 0.0 {
-                self.longest_move() > newton.tolerance
+                self.dx.iter().any(|d| d.amax() > newton.tolerance)
             } else {
                 let clusters = &stage.context.body.order.clusters;
                 let deviation = |particle: usize| self.r[particle] - predicted[particle];
@@ -255,11 +256,6 @@ impl StageSolver {
             }
         }
         solved
-    }
-
-    /// The largest component of the direction `dx`, metres.
-    pub(super) fn longest_move(&self) -> f64 {
-        self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max)
     }
 
     /// Applies a fraction `share` of `dx` and updates the predictions of forces.
@@ -411,7 +407,7 @@ mod tests {
         let start: Vec<DVec3> = body.rest.iter().map(|x| x + DVec3::new(x.y * x.y, 0.3 * x.z, x.x * x.y)).collect();
         let inertial: Vec<DVec3> = start.iter().map(|x| x + DVec3::z().cross(x) * (5.0 * h)).collect();
         for line_search in [false, true] {
-            let mut solver = StageSolver::new(&body);
+            let mut solver = BodySolver::new(&body);
             solver.volumes = Volumes::new(&body, 1.0, &body.volumes);
             springs::particle_stiffness(&body, &context.rest, &mut solver.particle_stiffness);
             let volumes = solver.volumes.at(&body, &start);

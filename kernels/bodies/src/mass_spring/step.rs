@@ -15,7 +15,7 @@ use super::contact::{ContactConstraint, ContactMode};
 use super::energy::{Energies, measure};
 use super::frame::{FrameReport, Integrator, SolverFrame};
 use super::predictor::RigidMotion;
-use super::stage::{FrameContext, Solved, StageSolver};
+use super::stage::{BodySolver, FrameContext, Solved};
 use super::state::Carried;
 use super::volume::Inventory;
 use numerics::vector::DVec3;
@@ -78,7 +78,7 @@ pub(super) struct Stepped {
 
 /// What steps work with.
 pub(super) struct Stepper<'a> {
-    pub(super) solver: &'a mut StageSolver,
+    pub(super) solver: &'a mut BodySolver,
     pub(super) context: FrameContext<'a>,
     pub(super) frame: &'a SolverFrame<'a>,
     /// Length of the frame, seconds.
