@@ -192,7 +192,7 @@ impl BodySkin {
     }
 }
 
-/// SweptElements of a skin that obstacles have released, because they are overstretched. A collider that snags the skin
+/// Elements of a skin that obstacles have released, because they are overstretched. A collider that snags the skin
 /// would stretch it without limit, since contacts keep it on the side it came from.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ReleasedElements {

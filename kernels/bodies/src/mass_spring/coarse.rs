@@ -51,13 +51,13 @@ impl ContactFilters {
                 continue;
             }
             let smoother = &system.smoother[particle];
-            let gap_fraction = [DVec3::x(), DVec3::y(), DVec3::z()]
+            let resisted = [DVec3::x(), DVec3::y(), DVec3::z()]
                 .map(|axis| solve_lower_transpose(smoother, solve_lower(smoother, times(&block, axis))));
-            if gap_fraction.iter().all(|column| column.amax() < NEGLIGIBLE) {
+            if resisted.iter().all(|column| column.amax() < NEGLIGIBLE) {
                 continue;
             }
             let filter = std::array::from_fn(|k| {
-                let mut column = -gap_fraction[k];
+                let mut column = -resisted[k];
                 column[k] += 1.0;
                 column.into()
             });

@@ -154,7 +154,8 @@ impl Link {
     fn degenerate_pull(&self, x: &[DVec3], a: f64, particle: usize) -> (DVec3, f64, DVec3) {
         let other = self.other as usize;
         let (direction, length) = degenerate_direction(x[particle] - x[other], self.spring, particle < other);
-        let (k, tension) = (f64::from(self.k), f64::from(self.k) * (length - self.rest));
+        let k = f64::from(self.k);
+        let tension = k * (length - self.rest);
         let stiff = (a * a * k).min(MOST_STIFFNESS);
         let alpha = if length > 0.0 {
             stiff * (1.0 - self.rest * (1.0 / length)).max(0.0)
