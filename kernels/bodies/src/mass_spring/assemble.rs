@@ -16,8 +16,9 @@ impl BodySolver {
     /// The force on each particle at `x` and `v`.
     pub(super) fn forces(&mut self, stage: &Stage<'_>, x: &[DVec3], v: &[DVec3]) -> Vec<DVec3> {
         self.update_transient_forces(stage, x, v);
-        self.sum_up(stage, [x, v], false);
-        (0..x.len()).map(|particle| self.force(particle)).collect()
+        let mut out = vec![DVec3::zeros(); x.len()];
+        self.set_forces(stage, [x, v], &mut out, |_, force| force);
+        out
     }
 
     /// Evaluates volumes, thin tetrahedra and contacts at `x` and `v`, and the forces of the latter two.
@@ -46,11 +47,18 @@ impl BodySolver {
         }
     }
 
-    /// The force on a particle, of which what acts on it besides contacts and thin tetrahedra was just summed up.
+    /// The forces on a particle besides those of springs, contacts and thin tetrahedra. `regions` are those of the system, which may have been moved out.
     #[inline(always)]
-    fn force(&self, particle: usize) -> DVec3 {
-        let Sums { pull, others, .. } = self.system.sums[particle];
-        pull + self.transient_forces.get(particle).map_or(others, |force| others + force)
+    fn own_force(&self, regions: &RankOneTerms, stage: &Stage<'_>, particle: usize, [x, v]: [&[DVec3]; 2]) -> DVec3 {
+        let FrameContext { body, external, .. } = stage.context;
+        let own = external.force(particle, body.mass[particle], &stage.now, x[particle], v[particle]);
+        own - regions.gather(particle, &self.volumes.pressures, &self.volumes.gradients)
+    }
+
+    /// The `others` among the forces on a particle, with those of contacts and thin tetrahedra.
+    #[inline(always)]
+    fn with_transient_force(&self, particle: usize, others: DVec3) -> DVec3 {
+        self.transient_forces.get(particle).map_or(others, |force| others + force)
     }
 
     /// Evaluates the residual at `x`, and if `linear` the linear system too.
@@ -66,18 +74,12 @@ impl BodySolver {
             }
             self.linearise_steep_forces(stage);
             self.set_rank_one_terms(stage);
+            self.assemble_system(stage, [x, &v], &mut r);
+        } else {
+            self.set_forces(stage, [x, &v], &mut r, |particle, force| {
+                stage.residual(self.system.held[particle], particle, x, force)
+            });
         }
-        self.sum_up(stage, [x, &v], linear);
-        let (clusters, mut smoother) = (&stage.context.body.order.clusters, std::mem::take(&mut self.system.smoother));
-        clusters.for_each((&mut r[..], &mut smoother[..]), |cluster, (r, smoother)| {
-            for ((particle, r), smoother) in clusters.range(cluster).zip(r).zip(smoother) {
-                *r = stage.residual(self.system.held[particle], particle, x, self.force(particle));
-                if linear {
-                    *smoother = self.smoother(particle);
-                }
-            }
-        });
-        self.system.smoother = smoother;
         (self.v, self.r) = (v, r);
     }
 
@@ -95,52 +97,80 @@ impl BodySolver {
     /// changed.
     pub(super) fn complete_in_contact(&mut self, stage: &Stage<'_>, x: &[DVec3]) {
         self.set_rank_one_terms(stage);
+        let (mut r, mut smoother) = (std::mem::take(&mut self.r), std::mem::take(&mut self.system.smoother));
         let of_contacts = stage.contacts.iter().flat_map(ContactConstraint::sides).map(|side| side.0);
         let of_tets = self.thin_tets.iter().flat_map(|thin| thin.corners).map(|corner| corner as usize);
         for particle in of_contacts.chain(of_tets) {
-            self.r[particle] = stage.residual(self.system.held[particle], particle, x, self.force(particle));
-            self.system.smoother[particle] = self.smoother(particle);
+            (r[particle], smoother[particle]) = self.complete(&self.system, stage, particle, x);
         }
+        (self.r, self.system.smoother) = (r, smoother);
     }
 
-    /// Smoother of a particle, from what the system has of springs, regions and external forces, with contacts and thin
-    /// tetrahedra.
+    /// Residual and smoother of a particle at `x`, from what `system` has of springs, regions and external forces, with
+    /// contacts and thin tetrahedra.
     #[inline(always)]
-    fn smoother(&self, particle: usize) -> [f32; 6] {
-        let system = &self.system;
-        if system.held[particle] {
-            return [0.0; 6];
-        }
-        let mut block = system.sums[particle].block;
+    fn complete(&self, system: &System, stage: &Stage<'_>, particle: usize, x: &[DVec3]) -> (DVec3, [f32; 6]) {
+        let Sums { pull, others, mut block } = system.sums[particle];
         system.transient.add_block(particle, 1.0, usize::MAX, &mut block);
         if let Some(other) = system.blocks.get(particle) {
             block.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
         }
         [0, 3, 5].iter().for_each(|diagonal| block[*diagonal] += system.inertia[particle]);
-        smoother(&block)
+        let held = system.held[particle];
+        let force = pull + self.with_transient_force(particle, others);
+        (stage.residual(held, particle, x, force), if held { [0.0; 6] } else { smoother(&block) })
     }
 
-    /// Sums what acts on each particle at positions `x` with velocities `v` besides contacts and thin tetrahedra; if `linear`,
-    /// in the linear system too.
-    fn sum_up(&mut self, stage: &Stage<'_>, [x, v]: [&[DVec3]; 2], linear: bool) {
-        let FrameContext { body, external, .. } = stage.context;
-        let clusters = &body.order.clusters;
-        let System { records, sums, inertia, regions, .. } = &mut self.system;
-        let (links, volumes, regions) = (&self.links, &self.volumes, &*regions);
-        let records = RaggedSlice::new(&body.adjacency.starts, records);
-        clusters.for_each((&mut sums[..], &mut inertia[..], records), |cluster, (sums, inertia, records)| {
-            let particles = clusters.range(cluster);
-            springs::sum_up(&body.adjacency, links, records, x, stage.a, (particles.clone(), &mut *sums), linear);
-            for ((particle, sums), inertia) in particles.zip(sums).zip(inertia) {
-                let mass = body.mass[particle];
-                let own = external.force(particle, mass, &stage.now, x[particle], v[particle]);
-                sums.others = own - regions.gather(particle, &volumes.pressures, &volumes.gradients);
-                if linear {
-                    regions.add_block(particle, OVERLAP, usize::MAX, &mut sums.block);
-                    *inertia = mass + external.inertia(particle, mass, &stage.now, stage.a);
-                }
+    /// Sets `out` to `of` of each particle and the force on it, at positions `x` with velocities `v`.
+    fn set_forces(
+        &self,
+        stage: &Stage<'_>,
+        [x, v]: [&[DVec3]; 2],
+        out: &mut [DVec3],
+        of: impl Fn(usize, DVec3) -> DVec3 + Sync,
+    ) {
+        let body = stage.context.body;
+        body.order.clusters.for_each(out, |cluster, out: &mut [DVec3]| {
+            let particles = body.order.clusters.range(cluster);
+            let first = particles.start;
+            out.fill(DVec3::zeros());
+            for particle in particles {
+                springs::pull(body.adjacency.of(particle, &self.links), x, particle, first, out);
+                let out = &mut out[particle - first];
+                let others = self.own_force(&self.system.regions, stage, particle, [x, v]);
+                *out = of(particle, *out + self.with_transient_force(particle, others));
             }
         });
+    }
+
+    /// The residual `r` at positions `x` with velocities `v`, and the linear system there, whose rank-one terms and
+    /// blocks are set already.
+    fn assemble_system(&mut self, stage: &Stage<'_>, [x, v]: [&[DVec3]; 2], r: &mut [DVec3]) {
+        let FrameContext { body, external, .. } = stage.context;
+        let clusters = &body.order.clusters;
+        let mut system = std::mem::take(&mut self.system);
+        let regions = &system.regions;
+        let records = RaggedSlice::new(&body.adjacency.starts, &mut system.records);
+        let (sums, inertia) = (&mut system.sums[..], &mut system.inertia[..]);
+        let solver = &*self;
+        clusters.for_each((sums, inertia, records), |cluster, (sums, inertia, records)| {
+            let particles = clusters.range(cluster);
+            springs::linearise(&body.adjacency, &solver.links, records, x, stage.a, particles.clone(), sums);
+            for ((particle, sums), inertia) in particles.zip(sums).zip(inertia) {
+                sums.others = solver.own_force(regions, stage, particle, [x, v]);
+                regions.add_block(particle, OVERLAP, usize::MAX, &mut sums.block);
+                let mass = body.mass[particle];
+                *inertia = mass + external.inertia(particle, mass, &stage.now, stage.a);
+            }
+        });
+        let mut smoother = std::mem::take(&mut system.smoother);
+        clusters.for_each((r, &mut smoother[..]), |cluster, (r, smooth): (&mut [DVec3], &mut [[f32; 6]])| {
+            for ((particle, r), smooth) in clusters.range(cluster).zip(r).zip(smooth) {
+                (*r, *smooth) = solver.complete(&system, stage, particle, x);
+            }
+        });
+        system.smoother = smoother;
+        self.system = system;
     }
 
     /// Sets up the rank-one terms of thin tetrahedra and contacts.

@@ -133,6 +133,20 @@ pub(super) fn particle_stiffness(body: &SoftBody, rest: &RestLengths<'_>, out: &
     });
 }
 
+/// The direction of a spring from its other end, a unit vector, and its length.
+#[inline(always)]
+fn seen(link: &Link, particle: usize, x: &[DVec3]) -> (DVec3, f64) {
+    let d = x[particle] - x[link.other as usize];
+    let squared = d.norm_squared();
+    // Outside this range the square has lost precision, or the length is zero.
+    if squared > 1e-280 && squared < 1e280 {
+        let length = squared.sqrt();
+        (d * (1.0 / length), length)
+    } else {
+        degenerate_direction(d, link.spring, particle < link.other as usize)
+    }
+}
+
 /// Direction and length where the squared distance under- or overflows. For coinciding ends the direction is
 /// pseudo-random for each spring, so that duplicate particles separate.
 #[cold]
@@ -149,22 +163,25 @@ fn degenerate_direction(d: DVec3, spring: u32, first: bool) -> (DVec3, f64) {
 }
 
 impl Link {
+    /// Tension at a length, newtons.
+    #[inline(always)]
+    fn tension(&self, length: f64) -> f64 {
+        f64::from(self.k) * (length - self.rest)
+    }
+
     /// [`Pulls`] where the squared length under- or overflows.
     #[cold]
     fn degenerate_pull(&self, x: &[DVec3], a: f64, particle: usize) -> (DVec3, f64, DVec3) {
-        let other = self.other as usize;
-        let (direction, length) = degenerate_direction(x[particle] - x[other], self.spring, particle < other);
-        let k = f64::from(self.k);
-        let tension = k * (length - self.rest);
-        let stiff = (a * a * k).min(MOST_STIFFNESS);
+        let (direction, length) = seen(self, particle, x);
+        let k = (a * a * f64::from(self.k)).min(MOST_STIFFNESS);
         let alpha = if length > 0.0 {
-            stiff * (1.0 - self.rest * (1.0 / length)).max(0.0)
+            k * (1.0 - self.rest * (1.0 / length)).max(0.0)
         } else if self.rest > 0.0 {
             0.0
         } else {
-            stiff
+            k
         };
-        (direction * tension, alpha, direction * (stiff - alpha).max(0.0).sqrt())
+        (direction * self.tension(length), alpha, direction * (k - alpha).max(0.0).sqrt())
     }
 }
 
@@ -233,6 +250,24 @@ fn compute_pulls_body(pulls: &mut [Pulls], a: f64) {
     }
 }
 
+/// Adds the spring forces listed at `particle` to the forces of its cluster, which starts at the particle `first`.
+/// The sum of a particle is complete once it and all earlier ones of the cluster have been processed.
+#[inline(always)]
+pub(super) fn pull([inside, across]: [&[Link]; 2], x: &[DVec3], particle: usize, first: usize, forces: &mut [DVec3]) {
+    let force = |link: &Link| {
+        let (direction, length) = seen(link, particle, x);
+        direction * link.tension(length)
+    };
+    let mut sum = forces[particle - first];
+    for link in inside {
+        let force = force(link);
+        sum -= force;
+        forces[link.other as usize - first] += force;
+    }
+    across.iter().for_each(|link| sum -= force(link));
+    forces[particle - first] = sum;
+}
+
 /// What acts on a particle besides contacts and thin tetrahedra.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sums {
@@ -244,16 +279,25 @@ pub(super) struct Sums {
     pub(super) block: [f64; 6],
 }
 
-/// Sets `sums` to those of the springs of a cluster's `particles` at `x`, for a stage of `a`: forces, and if `linear` blocks
-/// too, with the `records` of these springs.
-pub(super) fn sum_up(
+impl Sums {
+    /// Adds the force and H of a spring.
+    #[inline(always)]
+    fn add(&mut self, pull: DVec3, h: [f64; 6]) {
+        self.pull += pull;
+        self.block.iter_mut().zip(h).for_each(|(sum, h)| *sum += h);
+    }
+}
+
+/// Sets `sums` to those of the springs of a cluster's `particles` at `x`, and sets the `records` of these springs, for a
+/// stage of `a`.
+pub(super) fn linearise(
     adjacency: &Adjacency,
     links: &[Link],
     mut records: RaggedSlice<'_, Record>,
     x: &[DVec3],
     a: f64,
-    (particles, sums): (std::ops::Range<usize>, &mut [Sums]),
-    linear: bool,
+    particles: std::ops::Range<usize>,
+    sums: &mut [Sums],
 ) {
     let first = particles.start;
     let begin = adjacency.starts[first] as usize;
@@ -277,26 +321,15 @@ pub(super) fn sum_up(
             let (pull, alpha, w) =
                 if pulls.sound[at % LANES] { pulls.at(at % LANES) } else { link.degenerate_pull(x, a, particle) };
             at += 1;
-            sum.pull -= pull;
+            *record = Record::new(link.other, alpha, w);
+            let h = [alpha + w.x * w.x, w.x * w.y, w.x * w.z, alpha + w.y * w.y, w.y * w.z, alpha + w.z * w.z];
+            sum.add(-pull, h);
             if index < inside.len() {
-                sums[link.other as usize - first].pull += pull;
-            }
-            if linear {
-                *record = Record::new(link.other, alpha, w);
-                let h = [alpha + w.x * w.x, w.x * w.y, w.x * w.z, alpha + w.y * w.y, w.y * w.z, alpha + w.z * w.z];
-                add(&mut sum.block, &h);
-                if index < inside.len() {
-                    add(&mut sums[link.other as usize - first].block, &h);
-                }
+                sums[link.other as usize - first].add(pull, h);
             }
         }
         sums[particle - first] = sum;
     }
-}
-
-#[inline(always)]
-fn add(block: &mut [f64; 6], other: &[f64; 6]) {
-    block.iter_mut().zip(other).for_each(|(sum, other)| *sum += other);
 }
 
 /// Elastic energy of spring `at`, joules.
