@@ -59,7 +59,7 @@ impl BodySkin {
     ) -> Result<Vec<Self>, CollisionError> {
         let particles = rest.len();
         if let Some(index) = links.iter().position(|ends| ends.iter().any(|end| *end as usize >= particles)) {
-            return Err(CollisionError::Link { index, ends: links[index], count: particles });
+            return Err(CollisionError::Link(index, links[index], particles));
         }
         let rest = &with_riding(rest.to_vec(), riding);
         surfaces.iter().try_for_each(|triangles| check_triangles(rest.len(), triangles))?;
@@ -112,15 +112,7 @@ impl BodySkin {
         let surface = &self.surface;
         let rides = surface.vertices.first().is_some_and(|vertex| self.rides(*vertex));
         let is_closed = surface.edges.iter().all(|edge| edge.faces.iter().all(|face| *face != NONE));
-        let volume = |x: &[[f64; 3]]| -> f64 {
-            // Relative to a point of it, so that far from the origin nothing is lost.
-            let origin = DVec3::from(surface.triangles.first().map_or([0.0; 3], |corners| x[corners[0] as usize]));
-            let cone = |corners: &[u32; 3]| {
-                let [a, b, c] = corners.map(|corner| DVec3::from(x[corner as usize]) - origin);
-                a.dot(&b.cross(&c))
-            };
-            surface.triangles.iter().map(cone).sum()
-        };
+        let volume = |x: &[[f64; 3]]| signed_volume(&surface.triangles, x);
         let rest = (rides && is_closed).then(|| volume(&self.rest)).filter(|rest| *rest != 0.0)?;
         Some(volume(x) / rest)
     }
@@ -180,13 +172,6 @@ impl BodySkin {
         all
     }
 
-    /// These particles, ascending, as the released ones.
-    pub(super) fn releasing_particles(&self, released: &[u32]) -> ReleasedElements {
-        let mut particles = vec![false; self.len()];
-        released.iter().for_each(|particle| particles[*particle as usize] = true);
-        ReleasedElements { particles, ..ReleasedElements::default() }
-    }
-
     /// Number of edges released by obstacles with particles at `x`: those more than eight times as long as at rest
     /// and as the skin's mean edge.
     pub fn released_edges(&self, x: &[[f64; 3]]) -> usize {
@@ -207,7 +192,7 @@ impl BodySkin {
     }
 }
 
-/// SweptElements of a skin that obstacles have released, because they are overstretched. A collider that snags the skin
+/// Elements of a skin that obstacles have released, because they are overstretched. A collider that snags the skin
 /// would stretch it without limit, since contacts keep it on the side it came from.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ReleasedElements {
@@ -229,7 +214,7 @@ fn edge_length(edge: &Edge, places: &[[f64; 3]]) -> f64 {
     (at.position(edge.ends[0]) - at.position(edge.ends[1])).norm()
 }
 
-/// Six times the volume that triangles enclose.
+/// Six times the volume that triangles enclose; relative to a point of theirs, so that far from the origin nothing is lost.
 fn signed_volume(triangles: &[[u32; 3]], places: &[[f64; 3]]) -> f64 {
     let origin = DVec3::from(places[triangles[0][0] as usize]);
     let corners = |face: &[u32; 3]| face.map(|corner| DVec3::from(places[corner as usize]) - origin);

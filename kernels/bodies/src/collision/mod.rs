@@ -22,6 +22,7 @@ mod obstacle;
 mod overlap;
 mod pair;
 mod piercing;
+mod solid;
 mod surface;
 mod vertex;
 
@@ -34,8 +35,7 @@ use closeness::Yielding;
 pub use motion::ObstaclePose;
 use numerics::closest_point::ClosestPoint;
 use numerics::parallel;
-use numerics::swept;
-use numerics::swept::SweptBoxTree;
+use numerics::swept::{self, SweptBoxTree};
 use numerics::tree::{Cuboid, TriangleTree};
 use numerics::vector::{DVec3, to_f32};
 pub use obstacle::{Ground, Obstacle};
@@ -66,54 +66,23 @@ pub enum CollisionError {
     #[error("an obstacle has no pose; expected one at least")]
     NoPose,
     /// A pose with another number of points than the first.
-    #[error("pose {index} has {count} points; expected {expected}, like the first")]
-    Points {
-        /// Index of the pose.
-        index: usize,
-        /// Its number of points.
-        count: usize,
-        /// Number of points of the first pose.
-        expected: usize,
-    },
+    #[error("pose {0} has {1} points; expected {2}, like the first")]
+    Points(usize, usize, usize),
     /// Times of poses do not increase.
-    #[error("`share` of pose {index} is {share}; expected a finite number above the one before")]
-    Share {
-        /// Index of the pose.
-        index: usize,
-        /// Its time, as a fraction of the frame.
-        share: f64,
-    },
+    #[error("`share` of pose {0} is {1}; expected a finite number above the one before")]
+    Share(usize, f64),
     /// A coordinate is NaN or infinite.
     #[error("point {0} is not finite")]
     Point(usize),
-    /// A triangle has an index out of range.
-    #[error("triangle {index} has corners {corners:?}; expected indices below {count}")]
-    Triangle {
-        /// Index of the triangle.
-        index: usize,
-        /// Its corners.
-        corners: [u32; 3],
-        /// Number of points.
-        count: usize,
-    },
-    /// A link has an index out of range.
-    #[error("link {index} joins {ends:?}; expected indices below {count}")]
-    Link {
-        /// Index of the link.
-        index: usize,
-        /// Its ends.
-        ends: [u32; 2],
-        /// Number of particles.
-        count: usize,
-    },
+    /// A triangle has a corner out of range.
+    #[error("triangle {0} has corners {1:?}; expected indices below {2}")]
+    Triangle(usize, [u32; 3], usize),
+    /// A link has an end out of range.
+    #[error("link {0} joins {1:?}; expected indices below {2}")]
+    Link(usize, [u32; 2], usize),
     /// A parameter is negative or not finite.
-    #[error("`{what}` is {value}; expected a finite number, 0 or more")]
-    Number {
-        /// Name of the parameter.
-        what: &'static str,
-        /// Its value.
-        value: f64,
-    },
+    #[error("`{0}` is {1}; expected a finite number, 0 or more")]
+    Number(&'static str, f64),
 }
 
 /// Everything that may be in contact.
@@ -152,7 +121,7 @@ impl ContactFinder for CollisionScene<'_> {
                 for obstacle in 0..self.obstacles.len() {
                     let pushed = pushed.get(&(index, obstacle));
                     let released = match pushed {
-                        Some(pushed) => skin.releasing_particles(pushed),
+                        Some(particles) => ReleasedElements { particles: particles.clone(), ..Default::default() },
                         None => skin.releasing(&released, self.caught_by(obstacle)),
                     };
                     self.against_obstacle(query, (index, &released), &boxes, obstacle, &mut |meeting, tree| {

@@ -58,7 +58,7 @@ impl Motion {
             Some((index, 1.0)) => self.poses[index + 1].positions.clone(),
             Some((index, along)) => {
                 let interval = &self.intervals[index];
-                if interval.is_still() {
+                if interval.angle == 0.0 {
                     let ends = self.poses[index].positions.iter().zip(&self.poses[index + 1].positions);
                     return ends.map(|(a, b)| DVec3::from(*a).lerp(&DVec3::from(*b), along).into()).collect();
                 }
@@ -139,10 +139,6 @@ impl PoseInterval {
         let axis = axis * (w.signum() / length);
         let radius = from.iter().map(|a| axis.cross(&(DVec3::from(*a) - middles[0])).norm()).fold(0.0, f64::max);
         Self { middles, axis, angle, radius }
-    }
-
-    fn is_still(&self) -> bool {
-        self.angle == 0.0
     }
 
     /// Rotation after the fraction `along` of the interval (Rodrigues).

@@ -45,16 +45,16 @@ impl Obstacle {
         check_triangles(points, triangles)?;
         for (index, pose) in poses.iter().enumerate() {
             if pose.positions.len() != points {
-                return Err(CollisionError::Points { index, count: pose.positions.len(), expected: points });
+                return Err(CollisionError::Points(index, pose.positions.len(), points));
             }
             if !pose.share.is_finite() || (index > 0 && pose.share <= poses[index - 1].share) {
-                return Err(CollisionError::Share { index, share: pose.share });
+                return Err(CollisionError::Share(index, pose.share));
             }
             check_points(&pose.positions)?;
         }
         for (what, value) in [("seconds", seconds), ("thickness", thickness), ("friction", friction)] {
             if !(value.is_finite() && value >= 0.0) {
-                return Err(CollisionError::Number { what, value });
+                return Err(CollisionError::Number(what, value));
             }
         }
         let surface = TriangleSurface::new(points, triangles);
@@ -128,7 +128,7 @@ pub(super) fn narrow(pose: &[[f64; 3]]) -> Vec<Vec3> {
 
 pub(super) fn check_triangles(points: usize, triangles: &[[u32; 3]]) -> Result<(), CollisionError> {
     match triangles.iter().position(|corners| corners.iter().any(|corner| *corner as usize >= points)) {
-        Some(index) => Err(CollisionError::Triangle { index, corners: triangles[index], count: points }),
+        Some(index) => Err(CollisionError::Triangle(index, triangles[index], points)),
         None => Ok(()),
     }
 }

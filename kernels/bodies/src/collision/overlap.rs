@@ -13,11 +13,13 @@
 //! [`CollisionScene::crossings`] finds them.
 
 use super::obstacle::narrow;
+use super::solid::Solid;
 use super::surface::{Moment, TriangleSurface};
 use super::{BodySkin, Closeness, CollisionScene, Obstacle};
 use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
-use crate::tets::{Enclosure, Exit, bounds};
+use crate::tets::{Enclosure, Exit};
 use numerics::closest_point::ClosestPoint;
+use numerics::swept;
 use numerics::tree::TriangleTree;
 use numerics::vector::DVec3;
 use serde::{Deserialize, Serialize};
@@ -72,8 +74,8 @@ pub struct Separation<'a> {
     pub seconds: f64,
 }
 
-/// The particles that are being pushed out of obstacles, by the indices of their skin and of the obstacle.
-type Pushed = BTreeMap<(usize, usize), Vec<u32>>;
+/// Which particles are being pushed out of obstacles, by the indices of their skin and of the obstacle.
+type Pushed = BTreeMap<(usize, usize), Vec<bool>>;
 
 /// Where bodies are, relative to what should keep them out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -181,28 +183,20 @@ impl CollisionScene<'_> {
     /// does not count. Obstacles that are open or face inwards have no inside.
     pub fn overlaps(&self, x: &[[f64; 3]]) -> (Vec<Overlap>, usize) {
         let (mut found, mut inside) = (Vec::new(), vec![false; x.len()]);
-        let mut mark = |marked: &[bool]| inside.iter_mut().zip(marked).for_each(|(all, own)| *all |= own);
-        let obstacles: Vec<_> = self.obstacles.iter().map(|obstacle| (obstacle, obstacle.at(0.0))).collect();
-        let thickness = self.body_contact.map_or(0.0, |contact| contact.thickness);
-        let boxes: Vec<_> = self.skins.iter().map(|skin| skin_bounds(skin, x)).collect();
-        for (skin, own) in self.skins.iter().enumerate() {
-            self.below_ground(skin, x, &mut found, &mut mark);
-            for (index, (obstacle, points)) in obstacles.iter().enumerate() {
-                if obstacle.surface.closed && overlap(&boxes[skin], &bounds(points.iter().copied())) {
-                    let gaps = [obstacle.thickness; 2];
-                    let side = Side::new(x, &own.touching, &own.surface, gaps);
-                    let other = Side::new(points, &obstacle.surface.vertices, &obstacle.surface, gaps);
-                    let pair = (skin, OverlapPartner::Obstacle(index));
-                    let room = self.room(own, x);
-                    mark(&add_overlap(pair, [&side, &other], room, obstacle.thickness, &mut found)[0]);
+        let boxes = swept::swept_boxes(&[x]);
+        let solids = self.solids(x, &boxes, 0.0);
+        for (skin, own) in solids[0].iter().enumerate() {
+            self.below_ground(skin, x, &mut found, &mut inside);
+            for other in self.partners(&solids, skin) {
+                let is_skin = matches!(other.is, OverlapPartner::Skin(_));
+                if !(is_skin || other.surface.closed) {
+                    continue;
                 }
-            }
-            for (index, next) in self.skins.iter().enumerate().skip(skin + 1) {
-                if self.body_contact.is_some() && overlap(&boxes[skin], &boxes[index]) {
-                    let [side, other] = [own, next].map(|of| Side::new(x, &of.touching, &of.surface, [thickness; 2]));
-                    let pair = (skin, OverlapPartner::Skin(index));
-                    let marked = add_overlap(pair, [&side, &other], None, thickness, &mut found);
-                    marked.iter().for_each(|marked| mark(marked));
+                let sides = [own, other].map(|of| Side::new(&of.points, of.candidates, of.surface, [other.gap; 2]));
+                let room = if is_skin { None } else { self.room(own, x) };
+                let marked = add_overlap((skin, other), [&sides[0], &sides[1]], room, &mut found);
+                for marked in &marked[..1 + usize::from(is_skin)] {
+                    inside.iter_mut().zip(marked).for_each(|(all, own)| *all |= own);
                 }
             }
         }
@@ -210,22 +204,21 @@ impl CollisionScene<'_> {
     }
 
     /// The upward direction of the ground, and how far a skin may be pushed down towards it.
-    fn room(&self, skin: &BodySkin, x: &[[f64; 3]]) -> Option<(DVec3, f64)> {
+    fn room(&self, skin: &Solid<'_>, x: &[[f64; 3]]) -> Option<(DVec3, f64)> {
         let ground = self.ground?;
         let up = DVec3::from(ground.up);
-        let heights = skin.touching.iter().map(|point| up.dot(&DVec3::from(x[*point as usize])) - ground.height);
+        let heights = skin.candidates.iter().map(|point| up.dot(&DVec3::from(x[*point as usize])) - ground.height);
         Some((up, SQUEEZED * heights.fold(0.0, f64::max)))
     }
 
-    fn below_ground(&self, skin: usize, x: &[[f64; 3]], found: &mut Vec<Overlap>, mark: &mut impl FnMut(&[bool])) {
+    fn below_ground(&self, skin: usize, x: &[[f64; 3]], found: &mut Vec<Overlap>, inside: &mut [bool]) {
         let Some(ground) = self.ground else { return };
-        let (mut inside, mut deepest) = (vec![false; x.len()], 0.0_f64);
+        let mut deepest = 0.0_f64;
         for particle in &self.skins[skin].touching {
             let depth = ground.height - DVec3::from(x[*particle as usize]).dot(&DVec3::from(ground.up));
-            inside[*particle as usize] = depth > ground.thickness;
+            inside[*particle as usize] |= depth > ground.thickness;
             deepest = deepest.max(depth);
         }
-        mark(&inside);
         if deepest > ground.thickness && deepest.is_finite() {
             let depth = deepest + ground.thickness;
             found.push(Overlap { skin, partner: OverlapPartner::Ground, direction: ground.up, depth });
@@ -299,14 +292,14 @@ impl CollisionScene<'_> {
         }
     }
 
-    /// Returns the particles that are pushed.
+    /// Returns which particles are pushed.
     fn out_of_obstacle(
         &self,
         query: &ContactQuery<'_>,
         overlap: &Overlap,
         other: &Obstacle,
         out: &mut Vec<Contact>,
-    ) -> Vec<u32> {
+    ) -> Vec<bool> {
         let first = &self.skins[overlap.skin];
         let normal = DVec3::from(overlap.direction);
         let [start, end] = query.times.map(|time| other.at(time));
@@ -328,7 +321,9 @@ impl CollisionScene<'_> {
             let ([a, b, c], [u, v, w]) = body.place(&solid, &exit, -normal);
             push(&exit, ([a, b, c, 0], [u, v, w, 0.0]), &[exit.point], &[1.0]);
         }
-        exits.iter().map(|exit| exit.point).collect()
+        let mut pushed = vec![false; query.from.len()];
+        exits.iter().for_each(|exit| pushed[exit.point as usize] = true);
+        pushed
     }
 
     /// Where contact points at `x` are at the end of the frame.
@@ -343,41 +338,35 @@ impl CollisionScene<'_> {
             let heights = points.map(|p| DVec3::from(p).dot(&DVec3::from(ground.up)) - ground.height);
             found.deepest = heights.fold(found.deepest, |deepest, height| deepest.max(ground.thickness - height));
         }
-        let ends: Vec<_> = self.obstacles.iter().map(|obstacle| obstacle.at(1.0)).collect();
-        let obstacles = self.obstacles.iter().zip(&ends);
-        let obstacles = obstacles.map(|(obstacle, at)| (None, &obstacle.surface, &at[..], obstacle.thickness));
-        let skins = self.skins.iter().enumerate();
-        let skins =
-            skins.filter_map(|(index, skin)| Some((Some(index), &skin.surface, x, self.body_contact?.thickness)));
+        let boxes = swept::swept_boxes(&[x]);
+        let solids = self.solids(x, &boxes, 1.0);
+        let [skins, obstacles] = &solids;
+        let skins_in_contact = if self.body_contact.is_some() { &skins[..] } else { &[] };
         let mut inside = vec![false; x.len()];
-        let boxes: Vec<_> = self.skins.iter().map(|skin| skin_bounds(skin, x)).collect();
-        for (own, surface, at, gap) in obstacles.chain(skins).filter(|solid| solid.1.closed) {
-            let around = bounds(surface.vertices.iter().map(|vertex| at[*vertex as usize]));
-            let others =
-                (0..).zip(self.skins).filter(|(skin, _)| Some(*skin) != own && overlap(&boxes[*skin], &around));
-            let near = others.flat_map(|(_, skin)| &skin.touching).copied();
-            let near: Vec<u32> = near.filter(|point| overlap(&[x[*point as usize]; 2], &around)).collect();
+        for solid in obstacles.iter().chain(skins_in_contact).filter(|solid| solid.surface.closed) {
+            let others = skins.iter().filter(|skin| skin.is != solid.is && swept::overlap(&skin.bounds, &solid.bounds));
+            let near = others.flat_map(|skin| skin.candidates).copied();
+            let near: Vec<u32> = near.filter(|point| swept::overlap(&boxes[*point as usize], &solid.bounds)).collect();
             if near.is_empty() {
                 continue;
             }
             // Points outside are left to contacts, which know how near they are.
             let mut within = vec![false; x.len()];
-            Enclosure::new(at, &surface.triangles, 0.0).mark(x, &near, &mut within);
+            Enclosure::new(&solid.points, &solid.surface.triangles, 0.0).mark(x, &near, &mut within);
             let within: Vec<u32> = near.into_iter().filter(|point| within[*point as usize]).collect();
             if within.is_empty() {
                 continue;
             }
-            let tree = TriangleTree::build(&narrow(at), &surface.triangles);
+            let tree = TriangleTree::build(&narrow(&solid.points), &solid.surface.triangles);
             let from: Vec<_> = within.iter().map(|point| x[*point as usize]).collect();
             for (point, closest) in within.iter().zip(tree.closest_each(&narrow(&from), f32::INFINITY)) {
                 let Some(distance) = closest.map(|closest| f64::from(closest.distance)) else { continue };
-                inside[*point as usize] |= distance > TOUCHING * gap;
-                found.deepest = found.deepest.max(gap + distance);
+                inside[*point as usize] |= distance > TOUCHING * solid.gap;
+                found.deepest = found.deepest.max(solid.gap + distance);
             }
         }
-        let pierced = self.deepest_piercing(x);
-        let gaps = self.obstacles.iter().map(|obstacle| obstacle.thickness);
-        let gap = gaps.chain(self.body_contact.map(|contact| contact.thickness)).fold(0.0, f64::max);
+        let pierced = self.deepest_piercing(&solids);
+        let gap = solids.iter().flatten().map(|solid| solid.gap).fold(0.0, f64::max);
         if pierced > TOUCHING * gap {
             found.deepest = found.deepest.max(gap + pierced);
         }
@@ -386,16 +375,15 @@ impl CollisionScene<'_> {
     }
 }
 
-/// Adds the overlap of two sides that keep a distance of `gap`, if there is one; returns which points of both are inside the
+/// Adds the overlap of a skin, by index, with another solid, if there is one; returns which points of both are inside the
 /// other. `ground` is its upward direction, and how far the first side may be pushed down.
 fn add_overlap(
-    (skin, partner): (usize, OverlapPartner),
+    (skin, solid): (usize, &Solid<'_>),
     [side, other]: [&Side<'_>; 2],
     ground: Option<(DVec3, f64)>,
-    gap: f64,
     found: &mut Vec<Overlap>,
 ) -> [Vec<bool>; 2] {
-    let inside = [side.within(other), other.within(side)];
+    let (gap, inside) = (solid.gap, [side.within(other), other.within(side)]);
     let [own, others] = [(side, &inside[0]), (other, &inside[1])].map(|(side, inside)| {
         let all = side.candidates.iter().copied().filter(|point| inside[*point as usize]);
         all.collect::<Vec<u32>>()
@@ -424,7 +412,7 @@ fn add_overlap(
         }
     }
     if let Some(direction) = shortest {
-        found.push(Overlap { skin, partner, direction: direction.into(), depth: depth + gap });
+        found.push(Overlap { skin, partner: solid.is, direction: direction.into(), depth: depth + gap });
     }
     inside
 }
@@ -445,12 +433,4 @@ pub(super) fn below(points: &[[f64; 3]], surface: &TriangleSurface, distance: f6
         }
     }
     below
-}
-
-fn skin_bounds(skin: &BodySkin, x: &[[f64; 3]]) -> [[f64; 3]; 2] {
-    bounds(skin.touching.iter().map(|particle| x[*particle as usize]))
-}
-
-fn overlap([low, high]: &[[f64; 3]; 2], [other_low, other_high]: &[[f64; 3]; 2]) -> bool {
-    (0..3).all(|axis| low[axis] <= other_high[axis] && other_low[axis] <= high[axis])
 }

@@ -18,7 +18,7 @@ pub struct ContactParams {
     pub friction: f64,
 }
 
-/// SweptElements nearer than this fraction of the gap at rest are considered joined.
+/// Elements nearer than this fraction of the gap at rest are considered joined.
 const JOINED: f64 = 1e-6;
 
 /// Two moving skins, or one with itself.

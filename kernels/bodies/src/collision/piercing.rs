@@ -3,24 +3,13 @@
 //! Limit: how deep a body goes through itself is not measured, only by how many edges.
 
 use super::obstacle::narrow;
-use super::surface::{Edge, Moment, TriangleSurface};
+use super::solid::{Solid, Solids};
+use super::surface::{Edge, Moment};
 use super::{BodySkin, CollisionScene, Overlap, OverlapPartner, TASK, overlap};
 use numerics::parallel;
-use numerics::swept::{self, SweptBoxTree, SweptElements};
-use numerics::tree::{Cuboid, TriangleTree};
+use numerics::swept::{self, SweptBoxTree};
+use numerics::tree::TriangleTree;
 use numerics::vector::DVec3;
-
-/// Positions of points, and their boxes.
-type Places<'a> = (&'a [[f64; 3]], &'a [Cuboid]);
-
-/// A surface at one time.
-#[derive(Clone, Copy)]
-struct Still<'a> {
-    surface: &'a TriangleSurface,
-    points: &'a [[f64; 3]],
-    boxes: &'a [Cuboid],
-    faces: &'a SweptElements<3>,
-}
 
 /// How far edges are in a surface.
 #[derive(Default)]
@@ -32,90 +21,41 @@ struct Pierced {
 }
 
 impl CollisionScene<'_> {
-    /// The largest distance below a surface that an edge of another one reaches, with contact points at `x` and obstacles
-    /// at the end of the frame, metres; 0 if none goes through another.
-    pub(super) fn deepest_piercing(&self, x: &[[f64; 3]]) -> f64 {
-        let boxes = swept::swept_boxes(&[x]);
-        let skins: Vec<Still<'_>> = self
-            .skins
-            .iter()
-            .map(|skin| Still { surface: &skin.surface, points: x, boxes: &boxes, faces: &skin.faces })
-            .collect();
+    /// The largest distance below a surface that an edge of another one reaches, metres; 0 if none goes through another.
+    pub(super) fn deepest_piercing(&self, solids: &Solids<'_>) -> f64 {
         let mut deepest = 0.0_f64;
-        for obstacle in self.obstacles {
-            let points = obstacle.at(1.0);
-            let boxes = swept::swept_boxes(&[&points]);
-            let still = Still { surface: &obstacle.surface, points: &points, boxes: &boxes, faces: &obstacle.faces };
-            for (own, skin) in skins.iter().zip(self.skins) {
-                let [of_skin, of_obstacle] = [own, &still].map(Still::bounds);
-                if swept::overlap(&of_skin, &of_obstacle) {
-                    let released = skin.released(x);
-                    let edges = skin.surface.edges.iter().zip(0..).filter(|(_, at)| !super::has(&released.edges, *at));
-                    let edges: Vec<&Edge> = edges.map(|(edge, _)| edge).collect();
-                    let sharp: Vec<&Edge> =
-                        obstacle.sharp_edges.iter().map(|edge| &obstacle.surface.edges[*edge as usize]).collect();
-                    deepest = deepest.max(own.reaches(&edges, &still));
-                    if released.faces.is_empty() {
-                        deepest = deepest.max(still.reaches(&sharp, own));
-                    }
+        for ((index, own), skin) in solids[0].iter().enumerate().zip(self.skins) {
+            let released = skin.released(&own.points);
+            for other in self.partners(solids, index) {
+                let (mut edges, mut others) = (own.edges(), other.edges());
+                if let OverlapPartner::Obstacle(obstacle) = other.is {
+                    edges.retain(|edge| !super::has(&released.edges, *edge));
+                    let sharp = &self.obstacles[obstacle].sharp_edges;
+                    others = if released.faces.is_empty() { sharp.clone() } else { Vec::new() };
                 }
-            }
-        }
-        if self.body_contact.is_some() {
-            for (second, other) in skins.iter().enumerate() {
-                for own in &skins[..second] {
-                    if swept::overlap(&own.bounds(), &other.bounds()) {
-                        let [edges, others] = [own, other].map(|skin| skin.surface.edges.iter().collect::<Vec<_>>());
-                        deepest = deepest.max(own.reaches(&edges, other)).max(other.reaches(&others, own));
-                    }
-                }
+                deepest = deepest.max(own.reaches(&edges, other)).max(other.reaches(&others, own));
             }
         }
         deepest
     }
-}
 
-impl CollisionScene<'_> {
     /// The pairs of a skin and a closed obstacle, or another skin, of which edges go through the other although no point is
     /// inside, so that they are not among `overlaps`: at the start of the frame, with contact points at `x`. Surfaces are tested
     /// a little below where they are, so that those that coincide count where what is below both crosses.
     pub fn crossings(&self, x: &[[f64; 3]], overlaps: &[Overlap]) -> Vec<(usize, OverlapPartner)> {
         let boxes = swept::swept_boxes(&[x]);
+        let solids = self.solids(x, &boxes, 0.0);
         let mut found = Vec::new();
-        let mut test = |pair: (usize, OverlapPartner),
-                        sides: [(&TriangleSurface, &SweptElements<3>, Places<'_>); 2],
-                        gap| {
-            let known = overlaps.iter().any(|overlap| (overlap.skin, overlap.partner) == pair);
-            let bounds = sides.map(|(surface, _, (_, boxes))| swept::bounds_of_finite(&surface.vertices, boxes));
-            if known || !sides.iter().all(|side| side.0.closed) || !swept::overlap(&bounds[0], &bounds[1]) {
-                return;
-            }
-            let points = sides.map(|(surface, _, (points, _))| overlap::below(points, surface, overlap::BELOW * gap));
-            let boxes = [0, 1].map(|own: usize| swept::swept_boxes(&[&points[own]]));
-            let still = |own: usize| {
-                let (surface, faces, _) = sides[own];
-                Still { surface, points: &points[own], boxes: &boxes[own], faces }
-            };
-            let goes_through = |own: usize| {
-                let edges: Vec<&Edge> = sides[own].0.edges.iter().collect();
-                still(own).reaches(&edges, &still(1 - own)) > 0.0
-            };
-            if goes_through(0) || goes_through(1) {
-                found.push(pair);
-            }
-        };
-        for (index, skin) in self.skins.iter().enumerate() {
-            let own = (&skin.surface, &skin.faces, (x, &boxes[..]));
-            for (at, obstacle) in self.obstacles.iter().enumerate() {
-                let points = obstacle.at(0.0);
-                let boxes = swept::swept_boxes(&[&points]);
-                let other = (&obstacle.surface, &obstacle.faces, (&points[..], &boxes[..]));
-                test((index, OverlapPartner::Obstacle(at)), [own, other], obstacle.thickness);
-            }
-            let Some(params) = self.body_contact else { continue };
-            for (next, other) in self.skins.iter().enumerate().skip(index + 1) {
-                let other = (&other.surface, &other.faces, (x, &boxes[..]));
-                test((index, OverlapPartner::Skin(next)), [own, other], params.thickness);
+        for (skin, own) in solids[0].iter().enumerate().filter(|(_, own)| own.surface.closed) {
+            for other in self.partners(&solids, skin).filter(|other| other.surface.closed) {
+                let pair = (skin, other.is);
+                if overlaps.iter().any(|overlap| (overlap.skin, overlap.partner) == pair) {
+                    continue;
+                }
+                let [own, other] = [own, other].map(|solid| solid.below(overlap::BELOW * other.gap));
+                if own.reaches(&own.edges(), &other).max(other.reaches(&other.edges(), &own)) > 0.0 {
+                    found.push(pair);
+                }
             }
         }
         found
@@ -178,17 +118,27 @@ impl CollisionScene<'_> {
     }
 }
 
-impl Still<'_> {
-    fn bounds(&self) -> Cuboid {
-        swept::bounds_of_finite(&self.surface.vertices, self.boxes)
+impl Solid<'_> {
+    /// The indices of all its edges.
+    fn edges(&self) -> Vec<u32> {
+        (0..self.surface.edges.len() as u32).collect()
+    }
+
+    /// The same with its points moved below the surface by a distance.
+    fn below(&self, distance: f64) -> Self {
+        let points = overlap::below(&self.points, self.surface, distance);
+        let boxes = swept::swept_boxes(&[&points]);
+        Self { points: points.into(), boxes: boxes.into(), ..self.clone() }
     }
 
     /// The largest distance below the surface of `other` that some of its edges reach.
-    fn reaches(&self, edges: &[&Edge], other: &Still<'_>) -> f64 {
-        let tree = other.faces.sweep(other.boxes, 0.0);
+    fn reaches(&self, edges: &[u32], other: &Solid<'_>) -> f64 {
+        let tree = other.faces.sweep(&other.boxes, 0.0);
         let parts = parallel::map(edges.chunks(TASK), |_, edges| {
             let (mut pierced, mut faces) = (Pierced::default(), Vec::new());
-            edges.iter().for_each(|edge| self.pierce(edge, (other, &tree), &mut faces, &mut pierced));
+            edges.iter().for_each(|edge| {
+                self.pierce(&self.surface.edges[*edge as usize], (other, &tree), &mut faces, &mut pierced)
+            });
             pierced
         });
         let deepest = parts.iter().map(|part| part.deepest).fold(0.0, f64::max);
@@ -196,7 +146,7 @@ impl Still<'_> {
         if within.is_empty() {
             return deepest;
         }
-        let solid = TriangleTree::build(&narrow(other.points), &other.surface.triangles);
+        let solid = TriangleTree::build(&narrow(&other.points), &other.surface.triangles);
         let closest = solid.closest_each(&narrow(&within), f32::INFINITY).into_iter().flatten();
         closest.map(|closest| f64::from(closest.distance)).fold(deepest, f64::max)
     }
@@ -204,13 +154,13 @@ impl Still<'_> {
     fn pierce(
         &self,
         edge: &Edge,
-        (other, tree): (&Still<'_>, &SweptBoxTree<'_>),
+        (other, tree): (&Solid<'_>, &SweptBoxTree<'_>),
         faces: &mut Vec<u32>,
         pierced: &mut Pierced,
     ) {
-        tree.overlapping(&swept::bounds_of(&edge.ends, self.boxes), faces);
+        tree.overlapping(&swept::bounds_of(&edge.ends, &self.boxes), faces);
         let [p, q] = edge.ends.map(|end| DVec3::from(self.points[end as usize]));
-        let at = Moment::of(other.points);
+        let at = Moment::of(&other.points);
         // Where it goes in, and where it comes out.
         let mut crossed: Vec<(f64, bool)> = Vec::new();
         for face in faces.iter() {

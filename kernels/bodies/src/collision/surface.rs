@@ -157,10 +157,14 @@ impl TriangleSurface {
         (length > 1e-12 * ab.norm() * ac.norm()).then(|| normal / length)
     }
 
-    /// The triangle across the side opposite to corner `k`.
+    /// The side of a triangle opposite to corner `k`; degenerate triangles have none.
+    fn side(&self, face: u32, k: usize) -> Option<&Edge> {
+        self.edges.get(self.sides[face as usize][(k + 1) % 3] as usize)
+    }
+
+    /// The triangle across that side.
     pub(super) fn across(&self, face: u32, k: usize) -> Option<u32> {
-        let edge = *self.edges.get(self.sides[face as usize][(k + 1) % 3] as usize)?;
-        edge.faces.into_iter().find(|other| *other != face && *other != NONE)
+        self.side(face, k)?.faces.into_iter().find(|other| *other != face && *other != NONE)
     }
 
     /// Outward direction at a point of a triangle: the angle-weighted mean of the adjacent normals (Bærentzen & Aanæs
@@ -170,7 +174,7 @@ impl TriangleSurface {
         let normal = |face: u32| if face == NONE { DVec3::zeros() } else { self.normal(at, face).unwrap_or_default() };
         match nearest.feature() {
             TriangleFeature::Inside => normal(nearest.face),
-            TriangleFeature::Side(k) => match self.edges.get(self.sides[nearest.face as usize][(k + 1) % 3] as usize) {
+            TriangleFeature::Side(k) => match self.side(nearest.face, k) {
                 Some(edge) => normal(edge.faces[0]) + normal(edge.faces[1]),
                 None => DVec3::zeros(),
             },
@@ -202,10 +206,9 @@ impl TriangleSurface {
         };
         match nearest.feature() {
             TriangleFeature::Inside => true,
-            TriangleFeature::Side(k) => {
-                let edge = self.edges.get(self.sides[nearest.face as usize][(k + 1) % 3] as usize);
-                edge.is_none_or(|edge| edge.opposite.into_iter().all(|third| third == NONE || behind(third)))
-            }
+            TriangleFeature::Side(k) => self
+                .side(nearest.face, k)
+                .is_none_or(|edge| edge.opposite.into_iter().all(|third| third == NONE || behind(third))),
             TriangleFeature::Corner(k) => {
                 self.edges_at(corners[k]).all(|edge| edge.ends.into_iter().all(|end| end == corners[k] || behind(end)))
             }

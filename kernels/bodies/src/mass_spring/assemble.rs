@@ -2,7 +2,7 @@
 
 use super::contact::{ContactConstraint, ContactMode, ContactState};
 use super::springs::{self, Sums};
-use super::stage::{FrameContext, Stage, StageSolver};
+use super::stage::{BodySolver, FrameContext, Stage};
 use super::system::{System, smoother, solve_lower};
 use numerics::partition::{Partition, RaggedSlice};
 use numerics::rank_one::{RankOneTerms, add_square};
@@ -12,7 +12,7 @@ use numerics::vector::DVec3;
 /// of the coupling within a region, which saves a tenth of the iterations.
 const OVERLAP: f64 = 3.0;
 
-impl StageSolver {
+impl BodySolver {
     /// The force on each particle at `x` and `v`.
     pub(super) fn forces(&mut self, stage: &Stage<'_>, x: &[DVec3], v: &[DVec3]) -> Vec<DVec3> {
         self.update_transient_forces(stage, x, v);

@@ -63,7 +63,7 @@ impl Stepper<'_> {
         end: &Kinematics,
         contacts: &[ContactConstraint],
     ) -> f64 {
-        let (body, external, layout) = (self.context.body, self.context.external, &self.solver.layout);
+        let (body, external) = (self.context.body, self.context.external);
         // For each piece its missing force, and velocities of obstacles with the sum of their weights.
         let mut pieces = vec![(DVec3::zeros(), DVec3::zeros(), 0.0); body.order.pieces.len()];
         for (contact, state) in contacts.iter().zip(&self.solver.contact_states) {
@@ -71,7 +71,7 @@ impl Stepper<'_> {
                 continue;
             }
             for (particle, weight) in contact.sides() {
-                let (missing, velocity, sum) = &mut pieces[layout.piece_of(particle)];
+                let (missing, velocity, sum) = &mut pieces[body.layout.piece_of(particle)];
                 *missing -= state.force * weight;
                 if !contact.is_two_sided() {
                     *velocity += contact.velocity * (state.normal_force * weight);
@@ -108,12 +108,11 @@ impl Stepper<'_> {
         /// Speeds below what gravity gives in this many frames are not resolved: what rests, or is rolled, does not bounce.
         const SLOW: f64 = 3.0;
         let body = self.context.body;
-        let layout = &self.solver.layout;
         // The squared speed of what each piece touches.
         let mut touched = vec![-1.0; body.order.pieces.len()];
         for contact in contacts.iter().filter(|c| c.clearance(&start.x, h).min(c.clearance(&end.x, 0.0)) < 0.0) {
             for (particle, _) in contact.sides() {
-                let piece = layout.piece_of(particle);
+                let piece = body.layout.piece_of(particle);
                 touched[piece] = contact.velocity.norm_squared().max(touched[piece]);
             }
         }
@@ -125,7 +124,7 @@ impl Stepper<'_> {
         for (at, [a, _]) in body.ends.iter().enumerate().filter(|(at, _)| self.context.rest.is_intact(*at as u32)) {
             let [then, now] = [&self.solver.lengths, &self.solver.lengths_now].map(|lengths| lengths[at]);
             let stored = |length| springs::stored(body, &self.context.rest, at, length);
-            let sums = &mut energy[layout.piece_of(*a as usize)];
+            let sums = &mut energy[body.layout.piece_of(*a as usize)];
             (sums[0], sums[1]) = (sums[0] + 2.0 * stored(then), sums[1] + 2.0 * stored(now));
             sums[2] += 2.0 * body.damping[at] * (now - then) * (now - then) / h;
         }

@@ -9,6 +9,7 @@
 //! inverted at rest is treated as its mirror image, and a flat one has no volume to preserve. Metres, seconds,
 //! kilograms.
 
+use super::coarse::Layout;
 use super::regions::Regions;
 use super::spacing::spacings;
 use super::tet_springs::{EDGES, edges, neighbours_of_missing};
@@ -85,28 +86,13 @@ pub enum BodyError {
     /// A coordinate is NaN or infinite.
     #[error("point {0} is not finite")]
     Point(usize),
-    /// A tetrahedron, spring or riding point has a particle index out of range, or one of the first two a particle twice.
-    #[error("{what} {index} joins particles {particles:?}; expected distinct indices below {count}")]
-    Particles {
-        /// `tetrahedron`, `spring` or `riding point`.
-        what: &'static str,
-        /// Index of that element.
-        index: usize,
-        /// Its particles.
-        particles: Vec<u32>,
-        /// Number of particles.
-        count: usize,
-    },
-    /// A parameter of a spring or particle is negative or not finite.
-    #[error("`{what}` of {index} is {value}; expected a finite number, 0 or more")]
-    Number {
-        /// Name of the parameter.
-        what: &'static str,
-        /// Index of the spring or particle.
-        index: usize,
-        /// Its value.
-        value: f64,
-    },
+    /// A tetrahedron, spring or riding point, of an index, has a particle out of range, or one of the first two a particle
+    /// twice.
+    #[error("{0} {1} joins particles {2:?}; expected distinct indices below {3}")]
+    Particles(&'static str, usize, Vec<u32>, usize),
+    /// A parameter of the spring or particle of an index is negative or not finite.
+    #[error("`{0}` of {1} is {2}; expected a finite number, 0 or more")]
+    Number(&'static str, usize, f64),
     /// The total mass is zero.
     #[error("the body has no mass; expected at least one tet with a volume and a density above 0")]
     NoMass,
@@ -132,6 +118,7 @@ pub struct SoftBody {
     /// Young's modulus of each of `tets`, times the share that is filled.
     pub(super) moduli: Vec<f64>,
     pub(super) regions: Regions,
+    pub(super) layout: Layout,
     /// Springs in fixed parts, for parallel loops.
     pub(super) spring_partition: Partition,
     /// Tetrahedra in fixed parts.
@@ -141,7 +128,7 @@ pub struct SoftBody {
     /// Index in the mesh of each of `tets`.
     kept: Vec<u32>,
     /// Number of springs that come from the mesh; explicit ones follow.
-    mesh_spring_count: usize,
+    pub(super) mesh_spring_count: usize,
     /// For each missing edge, the surface edges whose mean stiffness it takes.
     means: Vec<Vec<u32>>,
     /// Points that ride along, by the caller's indices.
@@ -213,16 +200,6 @@ impl SoftBody {
     /// Rest length of each spring before any plastic flow or reset, metres.
     pub fn lengths(&self) -> &[f64] {
         &self.lengths
-    }
-
-    /// Rest position of a particle, by the caller's index, metres.
-    pub fn rest_point(&self, particle: usize) -> [f64; 3] {
-        self.rest[self.order.index_of[particle] as usize].into()
-    }
-
-    /// Number of springs that come from the mesh; explicit ones follow.
-    pub fn mesh_spring_count(&self) -> usize {
-        self.mesh_spring_count
     }
 
     /// Mass of each particle, by the caller's index, kilograms.
@@ -376,12 +353,7 @@ impl SoftBody {
         mesh.missing.iter().enumerate().try_for_each(|(index, ends)| distinct("spring", index, ends, count))?;
         for (index, carrier) in mesh.riding.iter().enumerate() {
             if carrier.particles.iter().any(|particle| *particle as usize >= count) {
-                return Err(BodyError::Particles {
-                    what: "riding point",
-                    index,
-                    particles: carrier.particles.to_vec(),
-                    count,
-                });
+                return Err(BodyError::Particles("riding point", index, carrier.particles.to_vec(), count));
             }
             carrier.weights.iter().try_for_each(|weight| number("weight", index, weight.abs()).map(|_| ()))?;
         }
@@ -415,13 +387,14 @@ impl SoftBody {
             })
             .collect();
         let ends: Vec<[u32; 2]> = ends.iter().map(|ends| ends.map(|end| order.index_of[end as usize])).collect();
-        let spacing = spacings(&order, &ends, &lengths);
         let rest: Vec<DVec3> = order.caller_of.iter().map(|caller| points[*caller as usize]).collect();
         let (kept, tets) = with_volume(mesh, &points, &order);
         let volumes: Vec<f64> = kept.iter().map(|tet| given[*tet as usize].volume).collect();
         let low = rest.iter().fold(DVec3::repeat(f64::INFINITY), |low, p| low.inf(p));
         let high = rest.iter().fold(DVec3::repeat(f64::NEG_INFINITY), |high, p| high.sup(p));
         let regions = Regions::new(&rest, &tets);
+        let adjacency = Adjacency::new(&order.clusters, &ends);
+        let layout = Layout::new(&order, &adjacency, &regions);
         let zeros = std::iter::repeat_n(0.0, mesh_spring_count);
         Ok(Self {
             stiffness: zeros.clone().chain(joints.iter().map(|spring| f64::from(spring.stiffness as f32))).collect(),
@@ -431,7 +404,9 @@ impl SoftBody {
             size: if count > 0 { (high - low).max() } else { 0.0 },
             mass: vec![1.0; count],
             moduli: vec![0.0; tets.len()],
-            adjacency: Adjacency::new(&order.clusters, &ends),
+            spacing: spacings(&layout, order.pieces.len(), &ends, &lengths),
+            layout,
+            adjacency,
             order,
             rest,
             ends,
@@ -444,7 +419,6 @@ impl SoftBody {
             means,
             riding: mesh.riding.to_vec(),
             mesh_spring_count,
-            spacing,
         })
     }
 }
@@ -459,7 +433,7 @@ fn mean(values: &[f64]) -> f64 {
 }
 
 fn number(what: &'static str, index: usize, value: f64) -> Result<f64, BodyError> {
-    if value.is_finite() && value >= 0.0 { Ok(value) } else { Err(BodyError::Number { what, index, value }) }
+    if value.is_finite() && value >= 0.0 { Ok(value) } else { Err(BodyError::Number(what, index, value)) }
 }
 
 /// A stiffness rounded to f32, as forces store it, so that energies match forces exactly.
@@ -470,7 +444,7 @@ fn stiffness(index: usize, k: f64) -> Result<f64, BodyError> {
 fn distinct(what: &'static str, index: usize, particles: &[u32], count: usize) -> Result<(), BodyError> {
     let doubled = (1..particles.len()).any(|k| particles[..k].contains(&particles[k]));
     if doubled || particles.iter().any(|particle| *particle as usize >= count) {
-        return Err(BodyError::Particles { what, index, particles: particles.to_vec(), count });
+        return Err(BodyError::Particles(what, index, particles.to_vec(), count));
     }
     Ok(())
 }

@@ -105,7 +105,7 @@ impl Stepper<'_> {
         if contacts.is_empty() && motion.carried.impacts.is_empty() {
             return None;
         }
-        let mut now = Touch::all(contacts, &motion.x, &self.solver.layout);
+        let mut now = Touch::all(contacts, &motion.x, &self.context.body.layout);
         let known = std::mem::take(&mut motion.carried.impacts);
         let mut work: Option<f64> = None;
         for mut impact in known {

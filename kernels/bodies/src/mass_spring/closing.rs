@@ -9,11 +9,11 @@
 //! stiff bodies would tilt. For the same reason contacts that a direction pulls on stay. Nor between bodies: those that start
 //! inside each other come apart less evenly with it.
 
-use super::stage::{Stage, StageSolver};
+use super::stage::{BodySolver, Stage};
 use numerics::quad::Quad;
 use numerics::vector::DVec3;
 
-impl StageSolver {
+impl BodySolver {
     /// Adds the contacts that the direction `dx` from `x` closes to the linear system with the right-hand side `right`, and
     /// sets the residual `r` to that of `dx`. Returns false if there are none.
     ///
@@ -21,7 +21,7 @@ impl StageSolver {
     /// Without friction it would glide on. Nor do heaps, which are pressed into more contacts than can be met.
     pub(super) fn close_contacts(&mut self, stage: &Stage<'_>, x: &[DVec3], right: &mut [DVec3]) -> bool {
         let mut touched = vec![false; stage.context.body.order.pieces.len()];
-        let piece_of = |first: u32| self.layout.piece_of(first as usize);
+        let piece_of = |first: u32| stage.context.body.layout.piece_of(first as usize);
         let known = stage.contacts.iter().zip(&mut self.contact_states);
         let mut known: Vec<_> = known.filter(|known| !known.0.is_two_sided()).collect();
         for (contact, _) in known.iter().filter(|known| known.1.normal_force > 0.0) {

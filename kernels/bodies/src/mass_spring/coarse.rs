@@ -4,9 +4,11 @@
 //! within a cluster do not resist them. Clusters are ordered so that neighbours have near indices, which keeps the
 //! factor's envelope narrow; for a thousand separate small bodies it is block-diagonal.
 
-use super::body::SoftBody;
 use super::galerkin::envelope;
+use super::regions::Regions;
 use super::system::{System, solve_lower, solve_lower_transpose, times};
+use numerics::adjacency::Adjacency;
+use numerics::cluster_order::ClusterOrder;
 use numerics::partition::Partition;
 use numerics::vector::{DMat3, DVec3, Vec3, to_f32, to_f64};
 use serde::{Deserialize, Serialize};
@@ -49,13 +51,13 @@ impl ContactFilters {
                 continue;
             }
             let smoother = &system.smoother[particle];
-            let gap_fraction = [DVec3::x(), DVec3::y(), DVec3::z()]
+            let resisted = [DVec3::x(), DVec3::y(), DVec3::z()]
                 .map(|axis| solve_lower_transpose(smoother, solve_lower(smoother, times(&block, axis))));
-            if gap_fraction.iter().all(|column| column.amax() < NEGLIGIBLE) {
+            if resisted.iter().all(|column| column.amax() < NEGLIGIBLE) {
                 continue;
             }
             let filter = std::array::from_fn(|k| {
-                let mut column = -gap_fraction[k];
+                let mut column = -resisted[k];
                 column[k] += 1.0;
                 column.into()
             });
@@ -103,8 +105,7 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    pub(super) fn new(body: &SoftBody) -> Self {
-        let order = &body.order;
+    pub(super) fn new(order: &ClusterOrder, adjacency: &Adjacency, regions: &Regions) -> Self {
         let mut layout = Self::default();
         for cluster in 0..order.clusters.len() {
             layout.cluster.extend(order.clusters.range(cluster).map(|_| cluster as u32));
@@ -113,11 +114,10 @@ impl Layout {
             layout.piece.extend(clusters.clone().map(|_| index as u32));
         }
         let mut first: Vec<u32> = (0..order.clusters.len() as u32).collect();
-        for particle in 0..body.len() {
-            let [_, across] = body.adjacency.of(particle, &body.adjacency.incident);
+        for particle in 0..order.caller_of.len() {
+            let [_, across] = adjacency.of(particle, &adjacency.incident);
             across.iter().for_each(|incident| layout.join(&mut first, &[particle as u32, incident.other]));
         }
-        let regions = &body.regions;
         for ends in regions.starts.windows(2) {
             layout.join(&mut first, &regions.particles[ends[0] as usize..ends[1] as usize]);
         }

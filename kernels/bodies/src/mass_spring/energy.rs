@@ -1,7 +1,7 @@
-//! Energies of a body and its worst spring, for reports and step control.
+//! Energies of a body, for reports and step control.
 
 use super::springs;
-use super::stage::{FrameContext, StageSolver};
+use super::stage::{BodySolver, FrameContext};
 use numerics::vector::{DVec2, DVec3};
 
 /// Energies, joules.
@@ -34,7 +34,7 @@ impl Energies {
 /// Measures the energies at `time`, a fraction of the frame; `looked` if volumes were last measured at these
 /// positions.
 pub(super) fn measure(
-    solver: &mut StageSolver,
+    solver: &mut BodySolver,
     context: &FrameContext<'_>,
     time: f64,
     [x, v]: [&[DVec3]; 2],
@@ -67,18 +67,4 @@ pub(super) fn measure(
     });
     let ([springs, dashed], [kinetic, goals, height]): ([f64; 2], [f64; 3]) = (springs.into(), own.into());
     Energies { kinetic, springs, volumes: stored + thin, goals, height, dashed }
-}
-
-/// The largest of stretch and compression, length ÷ rest length or its reciprocal, over springs with a rest length.
-pub(super) fn worst_stretch(context: &FrameContext<'_>, x: &[DVec3]) -> f64 {
-    let body = context.body;
-    let worst = body.spring_partition.map((), |part, ()| {
-        let springs = body
-            .spring_partition
-            .range(part)
-            .filter(|at| context.rest.is_intact(*at as u32) && context.rest.lengths[*at] > 0.0);
-        let stretch = springs.map(|at| springs::spring_length(body, x, at) / context.rest.lengths[at]);
-        stretch.map(|stretch| stretch.max(1.0 / stretch)).fold(1.0, f64::max)
-    });
-    worst.into_iter().fold(1.0, f64::max)
 }

@@ -9,7 +9,7 @@ use super::heap::ContactScale;
 use super::spacing;
 use super::springs::distance;
 use super::stage::{Solved, Stage};
-use super::step::{Interval, StepEnd, Stepper, deepest, sum};
+use super::step::{Interval, Kinematics, StepEnd, Stepper, deepest, sum};
 use numerics::vector::DVec3;
 
 /// Rounds of contact detection in a step.
@@ -18,6 +18,17 @@ const MOST_ROUNDS: u32 = 4;
 const MOST_NUDGE: f64 = 0.3;
 /// Depth of a particle in an obstacle, relative to the size of the bodies, from which its whole piece is set on the surface.
 const FAR: f64 = 1e6;
+
+/// Where the descent of a step begins.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Guess {
+    /// At predicted positions, on what they would pass.
+    Predicted,
+    /// Where the step starts, if it is out of balance by more than its contacts.
+    Start,
+    /// There, but pieces that nothing is near have moved on as wholes.
+    MovedOn,
+}
 
 impl Stepper<'_> {
     /// Potential contacts of a step in which particles move to `to`, with their loads at the start.
@@ -73,12 +84,16 @@ impl Stepper<'_> {
         (found, missed)
     }
 
-    /// A step of implicit Euler; `damped` if it starts out of balance by more than its contacts.
-    pub(super) fn euler(&mut self, step: Interval<'_>, contacts: &mut Vec<ContactConstraint>, damped: bool) -> StepEnd {
+    /// A step of implicit Euler.
+    pub(super) fn euler(&mut self, step: Interval<'_>, contacts: &mut Vec<ContactConstraint>, guess: Guess) -> StepEnd {
         let Interval { start, times, h } = step;
         let mut z = start.x.clone();
         let y: Vec<DVec3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
-        let mut x = if damped { start.x.clone() } else { self.slid(&start.x, &y, contacts, h) };
+        let mut x = match guess {
+            Guess::Predicted => self.slid(&start.x, &y, contacts, h),
+            Guess::Start => start.x.clone(),
+            Guess::MovedOn => self.moved_on(start, contacts, h),
+        };
         self.context.external.hold(times[1], &mut x, &mut z, h);
         let volumes = self.solver.volumes.at(self.context.body, &z);
         self.solver.set_step_start(&self.context, h, |first, second| distance(&z, first, second), volumes);
@@ -126,6 +141,25 @@ impl Stepper<'_> {
         if scale > 0.0 { scale } else { f64::INFINITY }
     }
 
+    /// The positions at the start of a step, from which pieces that nothing is near move on as wholes. Of their motion a descent
+    /// from there starts with that of their deformation alone: it cannot end with more potential energy than both were.
+    fn moved_on(&self, start: &Kinematics, contacts: &[ContactConstraint], h: f64) -> Vec<DVec3> {
+        let body = self.context.body;
+        let mut near = vec![false; body.order.pieces.len()];
+        for (particle, _) in contacts.iter().flat_map(ContactConstraint::sides) {
+            near[body.layout.piece_of(particle)] = true;
+        }
+        let mut x = start.x.clone();
+        for (piece, _) in body.order.pieces.iter().zip(near).filter(|(_, near)| !near) {
+            let particles = body.particles(piece);
+            if !particles.clone().any(|particle| self.solver.system.is_loose(particle)) {
+                let by = body.mean_by_mass(particles.clone(), &start.v) * h;
+                x[particles].iter_mut().for_each(|x| *x += by);
+            }
+        }
+        x
+    }
+
     /// The predicted positions `y`, moved so that contacts stay as deep as at `x` or just touch: friction acts on
     /// slip, so the initial guess should not contain normal motion. Pieces that an obstacle stops at once are set on it as a
     /// whole: the first directions would leave their particles thousands of sizes apart, from where no descent comes back.
@@ -143,8 +177,7 @@ impl Stepper<'_> {
         let body = self.context.body;
         let mut back = vec![DVec3::zeros(); body.order.pieces.len()];
         for contact in contacts.iter().filter(|contact| !contact.is_two_sided()) {
-            let (depth, piece) =
-                (-contact.clearance(&out, 0.0), self.solver.layout.piece_of(contact.particles[0] as usize));
+            let (depth, piece) = (-contact.clearance(&out, 0.0), body.layout.piece_of(contact.particles[0] as usize));
             if depth > FAR * body.size && depth > back[piece].norm() {
                 back[piece] = contact.normal * depth;
             }

@@ -24,10 +24,6 @@ pub struct DirectionalModulus {
 impl SoftBody {
     /// The modulus of each piece that has tetrahedra with a volume.
     pub fn directional_moduli(&self) -> Vec<DirectionalModulus> {
-        let mut piece_of = vec![0; self.len()];
-        for (index, piece) in self.order.pieces.iter().enumerate() {
-            piece_of[self.particles(piece)].fill(index);
-        }
         // Of each piece the stiffness against strains xx, yy, zz, yz, xz, xy at E = 1, and its volume.
         let mut sums = vec![(Matrix6::zeros(), 0.0); self.order.pieces.len()];
         for (spring, energy) in self.spread(|tet| tet.filled()).into_iter().enumerate() {
@@ -35,11 +31,11 @@ impl SoftBody {
             let along = self.rest[b] - self.rest[a];
             if energy > 0.0 && along != DVec3::zeros() {
                 let strain = products(along.normalize());
-                sums[piece_of[a]].0 += strain * strain.transpose() * energy;
+                sums[self.layout.piece_of(a)].0 += strain * strain.transpose() * energy;
             }
         }
         for tet in &self.given {
-            sums[piece_of[self.order.index_of[tet.corners[0] as usize] as usize]].1 += tet.filled();
+            sums[self.layout.piece_of(self.order.index_of[tet.corners[0] as usize] as usize)].1 += tet.filled();
         }
         let of_piece = |(piece, (stiffness, volume)): (&std::ops::Range<usize>, (Matrix6<f64>, f64))| {
             let compliance = (stiffness / volume).cholesky()?.inverse();

@@ -1,12 +1,12 @@
 //! One frame of a body: input, report, and step size control.
 
 use super::body::SoftBody;
-use super::energy::{Energies, measure, worst_stretch};
+use super::energy::{Energies, measure};
 use super::external::{Ambient, ExternalForces, GoalSpring, Pin};
 use super::finder::{ContactFinder, ContactQuery};
 use super::heap::heaps;
 use super::springs::{self, RestLengths};
-use super::stage::{FrameContext, StageSolver};
+use super::stage::{BodySolver, FrameContext};
 use super::state::State;
 use super::step::{Kinematics, Stepped, Stepper};
 use super::volume::{Inventory, Volumes};
@@ -142,18 +142,7 @@ pub struct FrameReport {
     pub stopped: u32,
 }
 
-/// Steps a body through frames. What it keeps between calls only saves allocations; it does not affect results.
-#[derive(Clone, Debug)]
-pub struct BodySolver {
-    solver: StageSolver,
-}
-
 impl BodySolver {
-    /// For `body`, whose topology must stay the same; its material may change.
-    pub fn new(body: &SoftBody) -> Self {
-        Self { solver: StageSolver::new(body) }
-    }
-
     /// Advances `state` by one frame.
     ///
     /// # Panics
@@ -174,11 +163,11 @@ impl BodySolver {
         let external = ExternalForces::new(body, frame, seconds);
         let lengths = state.rest_lengths();
         let rest = RestLengths { lengths: &lengths, torn: &state.torn };
-        self.solver.volumes = Volumes::new(body, frame.volume, &state.volumes);
-        self.solver.system.regions.idle = self.solver.volumes.is_disabled();
-        springs::particle_stiffness(body, &rest, &mut self.solver.particle_stiffness);
-        self.solver.heaps = heaps(body, external.at(1.0).gravity);
-        self.solver.system.set_loose(&external.held, &self.solver.particle_stiffness);
+        self.volumes = Volumes::new(body, frame.volume, &state.volumes);
+        self.system.regions.idle = self.volumes.is_disabled();
+        springs::particle_stiffness(body, &rest, &mut self.particle_stiffness);
+        self.heaps = heaps(body, external.at(1.0).gravity);
+        self.system.set_loose(&external.held, &self.particle_stiffness);
         let context =
             FrameContext { body, external: &external, rest, volumes: &state.volumes, cancelled: frame.cancelled };
         state.acceleration.resize(body.len(), [0.0; 3]);
@@ -189,13 +178,13 @@ impl BodySolver {
         }
         let (x, v) = (body.to_solver_order(&state.positions), body.to_solver_order(&state.velocities));
         let mut motion = Kinematics { x, v, acceleration, loads, carried: std::mem::take(&mut state.carried) };
-        self.solver.inventory = Inventory::new(body, &motion.x, &state.volumes);
-        self.solver.lengths.clear();
-        let before = measure(&mut self.solver, &context, 0.0, [&motion.x, &motion.v], false);
-        self.solver.lengths.clone_from(&self.solver.lengths_now);
-        self.solver.cached = std::mem::take(&mut state.cached);
+        self.inventory = Inventory::new(body, &motion.x, &state.volumes);
+        self.lengths.clear();
+        let before = measure(self, &context, 0.0, [&motion.x, &motion.v], false);
+        self.lengths.clone_from(&self.lengths_now);
+        self.cached = std::mem::take(&mut state.cached);
         let mut stepper = Stepper {
-            solver: &mut self.solver,
+            solver: self,
             context,
             frame,
             seconds,
@@ -210,13 +199,16 @@ impl BodySolver {
             stepper.advance_in(frame.substeps.clamp(1, MOST_STEPS), &mut motion, [0.0, 1.0], f64::INFINITY);
         }
         let (mut report, after) = (stepper.report, stepper.energies);
-        (report.inverted_tets, report.volume_ratio) = (self.solver.inventory.inverted, self.solver.inventory.ratio);
+        (report.inverted_tets, report.volume_ratio) = (self.inventory.inverted, self.inventory.ratio);
         (report.kinetic, report.elastic) = (after.kinetic, after.springs);
         (report.volume_energy, report.goal_energy) = (after.volumes, after.goals);
-        report.worst_stretch = worst_stretch(&context, &motion.x);
+        let springs = (0..).zip(self.lengths.iter().zip(&lengths));
+        let stretches = springs.filter(|(spring, (_, rest))| context.rest.is_intact(*spring) && **rest > 0.0);
+        let stretches = stretches.map(|(_, (now, rest))| now / rest);
+        report.worst_stretch = stretches.map(|stretch| stretch.max(1.0 / stretch)).fold(1.0, f64::max);
         report.lost_share =
             lost_share(report.energy_lost, [&before, &after], body, external.at(1.0).gravity.norm() * seconds);
-        (state.cached, state.carried) = (std::mem::take(&mut self.solver.cached), motion.carried);
+        (state.cached, state.carried) = (std::mem::take(&mut self.cached), motion.carried);
         state.loads.clear();
         state.loads.extend(body.contact_indices().map(|point| motion.loads[point]));
         for (caller, particle) in body.order.index_of.iter().enumerate() {

@@ -8,7 +8,7 @@
 
 use super::contact::ContactConstraint;
 use super::predictor::RigidMotion;
-use super::stage::{Stage, StageSolver};
+use super::stage::{BodySolver, Stage};
 use numerics::vector::DVec3;
 
 /// Force and torque left on a body, and change of the sum of its loads, that are tolerated, relative to that sum. They
@@ -71,7 +71,7 @@ struct PieceLoads {
     single: f64,
 }
 
-impl StageSolver {
+impl BodySolver {
     /// The balance of loads at `x`, for which the residual was just evaluated. Pinned pieces are in balance.
     pub(super) fn balance(&self, stage: &Stage<'_>, x: &[DVec3]) -> LoadBalance {
         let body = stage.context.body;
@@ -80,7 +80,7 @@ impl StageSolver {
             let now = contact.load_at(x, 0.0);
             let mut last = usize::MAX;
             for (particle, weight) in contact.sides() {
-                let piece = self.layout.piece_of(particle);
+                let piece = body.layout.piece_of(particle);
                 let loads = &mut pieces[piece];
                 loads.net += contact.normal * (weight * now);
                 if piece != last {

@@ -18,7 +18,6 @@ const CHEAP: f64 = 2e4;
 /// What the matrix is assembled from.
 #[derive(Clone, Copy)]
 pub(super) struct Galerkin<'a> {
-    pub(super) layout: &'a Layout,
     pub(super) body: &'a SoftBody,
     pub(super) system: &'a System,
     pub(super) motions: ClusterMotions<'a>,
@@ -27,7 +26,7 @@ pub(super) struct Galerkin<'a> {
 impl Galerkin<'_> {
     /// Assembles the matrix and factors it.
     pub(super) fn factor(&self) -> EnvelopeMatrix {
-        let (layout, transient) = (self.layout, &self.system.transient);
+        let (layout, transient) = (&self.body.layout, &self.system.transient);
         let (rows, first) = envelope(layout, self.system);
         let begin = |row: usize| MODES * first[row / MODES] as usize;
         let mut matrix = EnvelopeMatrix::zeros((0..layout.rows()).map(begin));
@@ -43,7 +42,7 @@ impl Galerkin<'_> {
 
     /// The blocks of a cluster's row from cluster `first` to the diagonal: springs and diagonal terms.
     fn band(&self, first: usize, cluster: usize) -> Vec<Block> {
-        let Self { layout, body, system, motions } = self;
+        let Self { body, system, motions } = self;
         let ClusterMotions { offset_from_centroid, filters } = motions;
         let mut blocks = vec![Block::default(); cluster + 1 - first];
         let last = cluster - first;
@@ -62,7 +61,7 @@ impl Galerkin<'_> {
                 let (other, alpha, w) = (record.other as usize, record.alpha(), record.along());
                 alike += alpha;
                 add_square(&mut own, w, 1.0);
-                let home = layout.cluster[other] as usize;
+                let home = body.layout.cluster[other] as usize;
                 if home < cluster && !system.held[other] {
                     let (block, far) = (&mut blocks[home - first], to_f64(offset_from_centroid[other]));
                     if filter.is_none() && filters.at(other).is_none() {
@@ -134,9 +133,9 @@ impl Galerkin<'_> {
     /// Change of a rank-one term by the rigid motions of each cluster. Empty if all its particles are in one cluster
     /// and unfiltered, since rigid motions change neither volumes nor gaps.
     fn couplings(&self, rows: &RankOneTerms, row: usize) -> Vec<Coupling> {
-        let Self { layout, system, motions, .. } = self;
+        let Self { body, system, motions } = self;
         let mut couplings: Vec<Coupling> = Vec::new();
-        let home = |particle: usize| layout.cluster[particle] as usize;
+        let home = |particle: usize| body.layout.cluster[particle] as usize;
         let particles = rows.particles(row);
         let free = |particle: usize| !system.held[particle] && motions.filters.at(particle).is_none();
         if particles

@@ -54,8 +54,9 @@ pub use contact::Contact;
 pub use evenness::DirectionalModulus;
 pub use external::{Ambient, GoalSpring, Pin};
 pub use finder::{ContactFinder, ContactQuery};
-pub use frame::{BodySolver, FrameReport, Integrator, SolverFrame};
+pub use frame::{FrameReport, Integrator, SolverFrame};
 pub use plastic::{Plasticity, flow, reset, tear};
+pub use stage::BodySolver;
 pub use state::State;
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 
 use super::body::SoftBody;
 use super::contact::ContactMode;
-use super::stage::{Stage, StageSolver};
+use super::stage::{BodySolver, Stage};
 use numerics::pieces::pieces;
 use numerics::rotation::CayleyRotation;
 use numerics::vector::{DMat3, DVec3};
@@ -28,14 +28,15 @@ struct ObstacleContact {
     directions: Vec<DVec3>,
 }
 
-impl StageSolver {
+impl BodySolver {
     /// Finds the groups of pieces, joined by contacts with each other, that are not pinned; and which pieces have no
     /// contact.
     pub(super) fn find_free_groups(&mut self, stage: &Stage<'_>) {
-        let pieces_in_all = stage.context.body.order.pieces.len();
-        let piece_of = |particle: usize| self.layout.piece_of(particle) as u32;
+        let body = stage.context.body;
+        let pieces_in_all = body.order.pieces.len();
+        let piece_of = |particle: usize| body.layout.piece_of(particle) as u32;
         let (mut bound, mut touched) = (vec![false; pieces_in_all], vec![false; pieces_in_all]);
-        for particle in (0..stage.context.body.len()).filter(|particle| self.system.is_loose(*particle)) {
+        for particle in (0..body.len()).filter(|particle| self.system.is_loose(*particle)) {
             bound[piece_of(particle) as usize] = true;
         }
         let mut links = Vec::new();
@@ -74,7 +75,7 @@ impl StageSolver {
         let known = stage.contacts.iter().zip(&self.contact_states).enumerate();
         let obstacle_contacts =
             known.filter(|known| known.1.1.mode != ContactMode::Open).filter_map(|(index, (contact, state))| {
-                let piece = self.layout.piece_of(contact.particles[0] as usize);
+                let piece = stage.context.body.layout.piece_of(contact.particles[0] as usize);
                 let group = self.groups[piece].filter(|_| !contact.is_two_sided())? as usize;
                 Some(ObstacleContact {
                     group,

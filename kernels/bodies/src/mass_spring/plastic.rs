@@ -43,7 +43,7 @@ pub fn flow(
     for spring in 0..body.ends.len() {
         let (length, dent) = (state.lengths[spring], state.dents[spring]);
         let meant = match &drawn {
-            Some(drawn) if spring < body.mesh_spring_count() => springs::spring_length(body, drawn, spring),
+            Some(drawn) if spring < body.mesh_spring_count => springs::spring_length(body, drawn, spring),
             _ => f64::NAN,
         };
         // The minimum or maximum of a number and NaN is the number.
@@ -69,7 +69,7 @@ pub fn reset(body: &SoftBody, state: &mut State, shape: &[[f64; 3]], share: f64,
     let (share, keep) = (share.clamp(0.0, 1.0), keep.clamp(0.0, 1.0));
     let goal = body.to_solver_order(shape);
     let blend = |from: f64, to: f64| if share >= 1.0 { to } else { from + (to - from) * share };
-    for spring in 0..body.mesh_spring_count() {
+    for spring in 0..body.mesh_spring_count {
         let length = springs::spring_length(body, &goal, spring);
         if !length.is_finite() {
             continue;
@@ -94,7 +94,7 @@ pub fn reset(body: &SoftBody, state: &mut State, shape: &[[f64; 3]], share: f64,
 pub fn tear(body: &SoftBody, state: &mut State, stretch: f64, reach: f64) -> u32 {
     let x = body.to_solver_order(&state.positions);
     let mut torn = 0;
-    for spring in body.mesh_spring_count()..body.ends.len() {
+    for spring in body.mesh_spring_count..body.ends.len() {
         let most = (stretch * state.lengths[spring] * state.dents[spring]).max(reach);
         if !state.torn[spring] && springs::spring_length(body, &x, spring) > most {
             state.torn[spring] = true;

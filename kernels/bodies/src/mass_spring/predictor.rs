@@ -162,10 +162,10 @@ impl<'a> Predictor<'a> {
         };
         let each: Vec<(DVec3, DVec3, [CayleyRotation; 2])> = self.pieces.iter().map(whole).collect();
         self.map(|index, particle| {
-            let (piece, (centre, whole, [solve_lower, turn])) = (&self.pieces[index], &each[index]);
+            let (piece, (centre, whole, [early_turn, turn])) = (&self.pieces[index], &each[index]);
             let offset = self.x[particle] - piece.centroid;
             let drift = self.v[particle] - piece.velocity(self.x[particle]);
-            whole + turn.apply(on(offset, drift, solve_lower.undo(middle[particle] - centre)))
+            whole + turn.apply(on(offset, drift, early_turn.undo(middle[particle] - centre)))
         })
     }
 

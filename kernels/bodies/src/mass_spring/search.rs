@@ -6,7 +6,7 @@ use super::body::SoftBody;
 use super::contact::ContactConstraint;
 use super::friction::LoadBalance;
 use super::springs;
-use super::stage::{CG_SHARE, CG_SHARE_PRECISE, FrameContext, Solved, Stage, StageSolver};
+use super::stage::{BodySolver, CG_SHARE, CG_SHARE_PRECISE, FrameContext, Solved, Stage};
 use numerics::vector::{DVec2, DVec3};
 
 /// Final ÷ initial residual.
@@ -48,7 +48,7 @@ impl ObjectiveParts {
     }
 }
 
-impl StageSolver {
+impl BodySolver {
     /// Solves the stage from the initial guess `x` by Newton's method with line search, until the residual is small, no
     /// contact is too deep, and the loads of friction are the normal forces of bodies in balance. Updates the loads of
     /// `contacts` on the way. `scale` bounds the squared initial residual, so that a poor initial guess does not loosen the

@@ -2,27 +2,21 @@
 //! one hide what a small one does.
 
 use super::body::SoftBody;
+use super::coarse::Layout;
 use super::contact::ContactConstraint;
-use numerics::cluster_order::ClusterOrder;
-use std::ops::Range;
 
 /// For each particle the mean rest length of the springs of its piece, metres; of pieces without springs that of all. Ends
 /// are in the solver's order.
-pub(super) fn spacings(order: &ClusterOrder, ends: &[[u32; 2]], lengths: &[f64]) -> Vec<f64> {
-    let particles = |piece: &Range<usize>| piece.clone().flat_map(|cluster| order.clusters.range(cluster));
-    let mut piece_of = vec![0; order.caller_of.len()];
-    for (index, piece) in order.pieces.iter().enumerate() {
-        particles(piece).for_each(|particle| piece_of[particle] = index);
-    }
-    let mut sums = vec![(0.0, 0); order.pieces.len()];
+pub(super) fn spacings(layout: &Layout, pieces: usize, ends: &[[u32; 2]], lengths: &[f64]) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0); pieces];
     for ([end, _], length) in ends.iter().zip(lengths) {
-        let (sum, count) = &mut sums[piece_of[*end as usize]];
+        let (sum, count) = &mut sums[layout.piece_of(*end as usize)];
         (*sum, *count) = (*sum + length, *count + 1);
     }
     let mean = |sum: f64, count: usize| sum / count.max(1) as f64;
     let all = mean(lengths.iter().sum(), lengths.len());
     let of = |piece: usize| if sums[piece].1 > 0 { mean(sums[piece].0, sums[piece].1) } else { all };
-    piece_of.into_iter().map(of).collect()
+    (0..layout.cluster.len()).map(|particle| of(layout.piece_of(particle))).collect()
 }
 
 /// The least of the pieces in contact, metres.

@@ -133,34 +133,17 @@ pub(super) fn particle_stiffness(body: &SoftBody, rest: &RestLengths<'_>, out: &
     });
 }
 
-/// A spring seen from one end: unit vector from the other end, length, and 1 ÷ length.
-#[derive(Clone, Copy)]
-struct SpringView {
-    direction: DVec3,
-    length: f64,
-    inverse: f64,
-}
-
-impl SpringView {
-    #[inline(always)]
-    fn from(link: &Link, particle: usize, x: &[DVec3]) -> Self {
-        let d = x[particle] - x[link.other as usize];
-        let squared = d.norm_squared();
-        // Outside this range the square has lost precision, or the length is zero.
-        if squared > 1e-280 && squared < 1e280 {
-            let length = squared.sqrt();
-            let inverse = 1.0 / length;
-            Self { direction: d * inverse, length, inverse }
-        } else {
-            let (direction, length) = degenerate_direction(d, link.spring, particle < link.other as usize);
-            Self { direction, length, inverse: 1.0 / length }
-        }
-    }
-
-    /// Tension, newtons.
-    #[inline(always)]
-    fn tension(&self, link: &Link) -> f64 {
-        f64::from(link.k) * (self.length - link.rest)
+/// The direction of a spring from its other end, a unit vector, and its length.
+#[inline(always)]
+fn seen(link: &Link, particle: usize, x: &[DVec3]) -> (DVec3, f64) {
+    let d = x[particle] - x[link.other as usize];
+    let squared = d.norm_squared();
+    // Outside this range the square has lost precision, or the length is zero.
+    if squared > 1e-280 && squared < 1e280 {
+        let length = squared.sqrt();
+        (d * (1.0 / length), length)
+    } else {
+        degenerate_direction(d, link.spring, particle < link.other as usize)
     }
 }
 
@@ -180,19 +163,25 @@ fn degenerate_direction(d: DVec3, spring: u32, first: bool) -> (DVec3, f64) {
 }
 
 impl Link {
+    /// Tension at a length, newtons.
+    #[inline(always)]
+    fn tension(&self, length: f64) -> f64 {
+        f64::from(self.k) * (length - self.rest)
+    }
+
     /// [`Pulls`] where the squared length under- or overflows.
     #[cold]
     fn degenerate_pull(&self, x: &[DVec3], a: f64, particle: usize) -> (DVec3, f64, DVec3) {
-        let view = SpringView::from(self, particle, x);
+        let (direction, length) = seen(self, particle, x);
         let k = (a * a * f64::from(self.k)).min(MOST_STIFFNESS);
-        let alpha = if view.length > 0.0 {
-            k * (1.0 - self.rest * view.inverse).max(0.0)
+        let alpha = if length > 0.0 {
+            k * (1.0 - self.rest * (1.0 / length)).max(0.0)
         } else if self.rest > 0.0 {
             0.0
         } else {
             k
         };
-        (view.direction * view.tension(self), alpha, view.direction * (k - alpha).max(0.0).sqrt())
+        (direction * self.tension(length), alpha, direction * (k - alpha).max(0.0).sqrt())
     }
 }
 
@@ -266,8 +255,8 @@ fn compute_pulls_body(pulls: &mut [Pulls], a: f64) {
 #[inline(always)]
 pub(super) fn pull([inside, across]: [&[Link]; 2], x: &[DVec3], particle: usize, first: usize, forces: &mut [DVec3]) {
     let force = |link: &Link| {
-        let view = SpringView::from(link, particle, x);
-        view.direction * view.tension(link)
+        let (direction, length) = seen(link, particle, x);
+        direction * link.tension(length)
     };
     let mut sum = forces[particle - first];
     for link in inside {

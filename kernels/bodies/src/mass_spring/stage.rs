@@ -6,7 +6,7 @@
 //! converge.
 
 use super::body::SoftBody;
-use super::coarse::{self, ClusterMotions, ContactFilters, Layout};
+use super::coarse::{self, ClusterMotions, ContactFilters};
 use super::conjugate_gradients::{Coarse, Limits, Reached};
 use super::contact::{ContactConstraint, ContactState};
 use super::external::{ExternalForces, Moment};
@@ -130,11 +130,10 @@ impl Solved {
     }
 }
 
-/// The linear system and buffers, kept between stages to avoid allocations; they do not affect results.
+/// Steps a body through frames. What it keeps between calls only saves allocations; it does not affect results.
 #[derive(Clone, Debug, Default)]
-pub(super) struct StageSolver {
+pub struct BodySolver {
     pub(super) system: System,
-    pub(super) layout: Layout,
     pub(super) volumes: Volumes,
     /// Whether `volumes` holds values for the positions evaluated next: a line search ends with evaluating the point
     /// it accepts.
@@ -176,8 +175,9 @@ pub(super) struct StageSolver {
     pub(super) hurried: bool,
 }
 
-impl StageSolver {
-    pub(super) fn new(body: &SoftBody) -> Self {
+impl BodySolver {
+    /// For `body`, whose topology must stay the same; its material may change.
+    pub fn new(body: &SoftBody) -> Self {
         let count = body.len();
         let mut system = System {
             records: vec![Record::default(); body.adjacency.incident.len()],
@@ -190,7 +190,7 @@ impl StageSolver {
         };
         let regions = &body.regions;
         system.regions.set_topology(count, &regions.starts, &regions.particles, regions.partition());
-        Self { system, layout: Layout::new(body), r: vec![DVec3::zeros(); count], ..Self::default() }
+        Self { system, r: vec![DVec3::zeros(); count], ..Self::default() }
     }
 
     /// Starts a stage with step coefficient `a`. Dashpots measure changes of length and volume from the start of the
@@ -238,7 +238,7 @@ impl StageSolver {
             solved.set_residual(after);
             solved.failed |= after > RISE * before;
             let wanted = if newton.tolerance > 0.0 {
-                self.longest_move() > newton.tolerance
+                self.dx.iter().any(|d| d.amax() > newton.tolerance)
             } else {
                 let clusters = &stage.context.body.order.clusters;
                 let deviation = |particle: usize| self.r[particle] - predicted[particle];
@@ -256,11 +256,6 @@ impl StageSolver {
             }
         }
         solved
-    }
-
-    /// The largest component of the direction `dx`, metres.
-    pub(super) fn longest_move(&self) -> f64 {
-        self.dx.iter().map(|d| d.amax()).fold(0.0, f64::max)
     }
 
     /// Applies a fraction `share` of `dx` and updates the predictions of forces.
@@ -321,8 +316,8 @@ impl StageSolver {
         let mut target = self.momentum_target(stage, &right);
         self.correct_linear_momentum(stage, &target);
         coarse::offset_from_centroid(&body.order.clusters, x, &mut self.offset_from_centroid);
-        let filters = ContactFilters::new(&self.system, &self.layout);
-        let old = self.cached.factor.len() != self.layout.rows() || self.cached.iterations_since > OLD;
+        let filters = ContactFilters::new(&self.system, &body.layout);
+        let old = self.cached.factor.len() != body.layout.rows() || self.cached.iterations_since > OLD;
         if old || filters.change(&self.cached.filters) > CONTACTS_CHANGED {
             self.renew(body, filters);
         }
@@ -377,14 +372,14 @@ impl StageSolver {
             return first;
         }
         // The factor is too old to be useful.
-        self.renew(body, ContactFilters::new(&self.system, &self.layout));
+        self.renew(body, ContactFilters::new(&self.system, &body.layout));
         let share = (limits.share / first.share.max(limits.share)).min(1.0);
         Reached { start: first.start, ..solve(self, Limits { share, cap: CG_CAP, ..limits }) }
     }
 
     fn renew(&mut self, body: &SoftBody, filters: ContactFilters) {
         let motions = ClusterMotions { offset_from_centroid: &self.offset_from_centroid, filters: &filters };
-        let factor = Galerkin { layout: &self.layout, body, system: &self.system, motions }.factor();
+        let factor = Galerkin { body, system: &self.system, motions }.factor();
         self.cached = CachedCoarseFactor { factor, filters, ..CachedCoarseFactor::default() };
     }
 }
@@ -412,7 +407,7 @@ mod tests {
         let start: Vec<DVec3> = body.rest.iter().map(|x| x + DVec3::new(x.y * x.y, 0.3 * x.z, x.x * x.y)).collect();
         let inertial: Vec<DVec3> = start.iter().map(|x| x + DVec3::z().cross(x) * (5.0 * h)).collect();
         for line_search in [false, true] {
-            let mut solver = StageSolver::new(&body);
+            let mut solver = BodySolver::new(&body);
             solver.volumes = Volumes::new(&body, 1.0, &body.volumes);
             springs::particle_stiffness(&body, &context.rest, &mut solver.particle_stiffness);
             let volumes = solver.volumes.at(&body, &start);

@@ -5,10 +5,10 @@
 //! than what it is now. The residual is that of the current forces.
 
 use super::contact::ContactState;
-use super::stage::{Stage, StageSolver};
+use super::stage::{BodySolver, Stage};
 use numerics::vector::DVec3;
 
-impl StageSolver {
+impl BodySolver {
     /// Linearises forces of contacts and thin tetrahedra at the predicted ones instead of the current ones, where they are
     /// smaller.
     pub(super) fn linearise_steep_forces(&mut self, stage: &Stage<'_>) {

@@ -13,15 +13,18 @@
 use super::body::SoftBody;
 use super::contact::{ContactConstraint, ContactMode};
 use super::energy::{Energies, measure};
+use super::euler::Guess;
 use super::frame::{FrameReport, Integrator, SolverFrame};
 use super::predictor::RigidMotion;
-use super::stage::{FrameContext, Solved, StageSolver};
+use super::stage::{BodySolver, FrameContext, Solved};
 use super::state::Carried;
 use super::volume::Inventory;
 use numerics::vector::DVec3;
 
 /// Energy gain of a step, relative to its energy, above which it is repeated with implicit Euler.
 const GAIN: f64 = 0.005;
+/// Gain that motion cannot pay, relative to the energy, above which a step is repeated from the positions at its start.
+const UNPAID: f64 = 1e-4;
 /// Steps of implicit Euler after one in which the set of active contacts changed.
 const EULER_STEPS_AFTER_CHANGE: u32 = 4;
 
@@ -67,8 +70,10 @@ pub(super) struct Stepped {
     pub(super) euler: bool,
     /// Energy removed to prevent a spurious gain, joules.
     pub(super) energy_removed: f64,
-    /// Energy lost without damping, drag or friction, joules.
+    /// Energy lost without damping, drag or friction, joules, and gained without external driving, which slowing the motion
+    /// could not take.
     pub(super) energy_lost: f64,
+    pub(super) energy_gained: f64,
     pub(super) after: Energies,
     pub(super) contacts: u32,
     pub(super) overlap: f64,
@@ -78,7 +83,7 @@ pub(super) struct Stepped {
 
 /// What steps work with.
 pub(super) struct Stepper<'a> {
-    pub(super) solver: &'a mut StageSolver,
+    pub(super) solver: &'a mut BodySolver,
     pub(super) context: FrameContext<'a>,
     pub(super) frame: &'a SolverFrame<'a>,
     /// Length of the frame, seconds.
@@ -91,8 +96,22 @@ pub(super) struct Stepper<'a> {
 }
 
 impl Stepper<'_> {
-    /// Steps from `start` between two `times`, as fractions of the frame.
+    /// Steps from `start` between two `times`, as fractions of the frame. From the predicted positions of a crumpled body a descent
+    /// may end in another valley of its energy, so high that no motion is left to slow. Then the step is repeated from where
+    /// the body is.
     pub(super) fn step(&mut self, start: &Kinematics, times: [f64; 2]) -> (Kinematics, Stepped) {
+        let first = self.step_once(start, times, false);
+        let unpaid = first.1.energy_gained > UNPAID * self.energies.scale().max(first.1.after.scale());
+        if !unpaid {
+            return first;
+        }
+        self.refresh_inventory(&start.x);
+        let (motion, stepped) = self.step_once(start, times, true);
+        (motion, Stepped { solved: repeated(first.1.solved, stepped.solved), ..stepped })
+    }
+
+    /// A step; with implicit Euler from where bodies are if they are to be `moved_on`.
+    fn step_once(&mut self, start: &Kinematics, times: [f64; 2], moved_on: bool) -> (Kinematics, Stepped) {
         let before = &{ self.energies };
         let h = (times[1] - times[0]) * self.seconds;
         let step = Interval { start, times, h };
@@ -102,11 +121,16 @@ impl Stepper<'_> {
         let turned = self.frame.volume > 0.0 && self.solver.inventory.inverted > 0;
         // Frozen contacts continue linearly, so surfaces that are being separated would be thrown apart.
         let through = full.iter().any(|contact| contact.is_penetrating(&start.x, h));
-        let damped = self.frame.force_implicit_euler || turned;
-        let euler = start.carried.euler_steps_left > 0 || damped || through;
+        let touched = full.iter().any(|contact| contact.clearance(&start.x, h) < 0.0);
+        let guess = match (moved_on, self.frame.force_implicit_euler || turned) {
+            (true, _) => Guess::MovedOn,
+            (_, true) => Guess::Start,
+            _ => Guess::Predicted,
+        };
+        let euler = start.carried.euler_steps_left > 0 || guess != Guess::Predicted || through;
         motion.carried.euler_steps_left = start.carried.euler_steps_left.saturating_sub(1);
         let (end, after) = if euler || self.frame.integrator == Integrator::Euler {
-            (self.euler(step, &mut full, damped), None)
+            (self.euler(step, &mut full, guess), None)
         } else {
             self.tr_bdf2_or_euler(step, before, &mut full, &mut motion.carried.euler_steps_left)
         };
@@ -140,6 +164,10 @@ impl Stepper<'_> {
         };
         if self.undriven(times) {
             self.remove_energy_gain(before, &mut motion, &mut stepped);
+            // What contacts had stored, they return.
+            if !touched {
+                stepped.energy_gained = (stepped.after.sum() - before.sum()).min(-motion.carried.energy_budget);
+            }
         } else {
             motion.carried.energy_budget = 0.0;
         }
@@ -179,9 +207,9 @@ impl Stepper<'_> {
                 end.solved
             }
         };
-        let mut end = self.euler(step, contacts, solved.failed || gained);
-        let Solved { failed, residual, .. } = end.solved;
-        end.solved = Solved { failed, residual, ..sum(solved, end.solved) };
+        let guess = if solved.failed || gained { Guess::Start } else { Guess::Predicted };
+        let mut end = self.euler(step, contacts, guess);
+        end.solved = repeated(solved, end.solved);
         *euler_steps_left = if active_set_unchanged { 0 } else { EULER_STEPS_AFTER_CHANGE };
         (end, None)
     }
@@ -264,6 +292,11 @@ pub(super) fn kinetic(body: &SoftBody, v: &[DVec3]) -> f64 {
 /// Depth of the deepest contact at `x`, metres below its gap; 0 without any.
 pub(super) fn deepest(contacts: &[ContactConstraint], x: &[DVec3]) -> f64 {
     contacts.iter().map(|contact| -contact.clearance(x, 0.0)).fold(0.0, f64::max)
+}
+
+/// Outcome of a solve that was taken again, with the work of both.
+fn repeated(first: Solved, again: Solved) -> Solved {
+    Solved { failed: again.failed, residual: again.residual, ..sum(first, again) }
 }
 
 pub(super) fn sum(a: Solved, b: Solved) -> Solved {

@@ -4,7 +4,7 @@
 use super::contact::ContactConstraint;
 use super::predictor::Predictor;
 use super::springs::{distance, drift};
-use super::stage::{FrameContext, Newton, Solved, Stage, StageSolver};
+use super::stage::{BodySolver, FrameContext, Newton, Solved, Stage};
 use super::step::{Interval, StepEnd, Stepper, sum};
 use numerics::vector::DVec3;
 
@@ -80,7 +80,7 @@ impl Stepper<'_> {
         let time = times[0] + GAMMA * (times[1] - times[0]);
         let mut x = step.predictor.at(2.0 * a);
         // Lengths and volumes follow the same rules as positions.
-        let extrapolate = |solver: &mut StageSolver, seconds: f64| {
+        let extrapolate = |solver: &mut BodySolver, seconds: f64| {
             let length = |first, second| {
                 let [length, rate] = drift(&start.x, &start.v, first, second);
                 length + rate * seconds

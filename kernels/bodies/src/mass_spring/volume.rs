@@ -328,7 +328,7 @@ pub(super) struct Inventory {
 impl Inventory {
     /// Evaluated at the positions `x`.
     pub(super) fn new(body: &SoftBody, x: &[DVec3], rest: &[f64]) -> Self {
-        let partition = body.tet_partition.map((), |part, ()| {
+        let parts = body.tet_partition.map((), |part, ()| {
             let (mut inverted, mut now, mut before, mut watched) = (0, 0.0, 0.0, Vec::new());
             for tet in body.tet_partition.range(part) {
                 let volume = volume(body.tets[tet].map(|corner| x[corner as usize]));
@@ -342,7 +342,7 @@ impl Inventory {
             (inverted, now, before, watched)
         });
         let (mut all, mut now, mut before) = (Self::default(), 0.0, 0.0);
-        for (inverted, volume, rest, watched) in partition {
+        for (inverted, volume, rest, watched) in parts {
             all.inverted += inverted;
             all.watched.extend(watched);
             now += volume;

@@ -415,16 +415,20 @@ fn bodies_with_extreme_stiffness_mass_or_start_come_to_rest_on_the_ground() {
 }
 
 /// Dough that hits the ground much too fast for the frame is flattened and inverted within one step. That may only
-/// take energy from its motion: no step ends with more energy than the one before, except for a few thousandths that
-/// contacts return.
+/// take energy from its motion: no step ends with more energy than the one before, except for two thousandths that steps
+/// before it lost. Starts that differ by 1e-9 m crumple in other ways.
 #[test]
 fn dough_smashed_within_one_step_gains_no_energy() {
-    for speed in [2.0, 3.0, 5.0, 8.0, 15.0, 30.0, 50.0, 100.0] {
+    let speeds = [2.0, 3.0, 5.0, 8.0, 15.0, 30.0, 50.0, 100.0];
+    for (speed, start) in speeds.into_iter().flat_map(|speed| [0, 4, 9].map(|start| (speed, start))) {
+        let (key, noise) = (Key::new(start), if start > 0 { 1e-9 } else { 0.0 });
         let (points, tets) = block([6, 6, 6], 0.02);
         let body =
             SoftBody::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material(1000.0, 5e3, 0.01), &[])
                 .unwrap();
         let mut state = State::at_rest(&body);
+        let random = |coordinate: usize| noise * (2.0 * key.of(coordinate as u64).f64() - 1.0);
+        state.positions.as_flattened_mut().iter_mut().enumerate().for_each(|(at, x)| *x += random(at));
         state.positions.iter_mut().for_each(|p| p[1] += 1.5 * THICKNESS);
         state.velocities.iter_mut().for_each(|v| v[1] = -speed);
         let ground = ground(0.5);
@@ -433,7 +437,7 @@ fn dough_smashed_within_one_step_gains_no_energy() {
         for frame in 0..24 {
             let report = solver.step(&body, &mut state, &SolverFrame { contacts: Some(&ground), volume: 1.0, ..BARE });
             let after = report.kinetic + report.elastic + report.volume_energy;
-            assert!(after <= before * 1.005, "{speed} m/s, frame {frame}: {before} J become {after}");
+            assert!(after <= before * 1.0025, "{speed} m/s, start {start}, frame {frame}: {before} J become {after}");
             before = after;
         }
     }

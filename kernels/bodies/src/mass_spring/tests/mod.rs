@@ -44,6 +44,13 @@ fn block(cells: [u32; 3], side: f64) -> (Vec<[f64; 3]>, Vec<[u32; 4]>) {
     cubes(cells.map(|n| n as usize), [0.0; 3], cells.map(|n| f64::from(n) * side))
 }
 
+impl SoftBody {
+    /// Rest position of a particle, by the caller's index.
+    fn rest_point(&self, particle: usize) -> [f64; 3] {
+        self.rest[self.order.index_of[particle] as usize].into()
+    }
+}
+
 fn block_body(cells: [u32; 3], side: f64, material: &Material<'_>) -> SoftBody {
     let (points, tets) = block(cells, side);
     SoftBody::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, material, &[]).unwrap()
