@@ -2,7 +2,7 @@
 
 use super::hair_guides::{LaneGuides, LanePlaces};
 use super::hairs::{CurveDeform, DeformedCurves};
-use super::turns::{LaneTurns, NO_GUIDE};
+use super::turns::{LaneTurns, NO_GUIDE, Turn};
 use crate::attach::RootPose;
 use nalgebra::{Quaternion, Unit};
 use numerics::lanes::{F32x16, F64x16, LANES, Lanes, get, set};
@@ -21,6 +21,12 @@ pub(super) struct Share {
     weight: F64x16,
     /// The weight times the rotation from the guide's frame to the hair's, row by row.
     matrix: [F64x16; 9],
+    /// The guides' rotations at the segment that is turned.
+    turns: [Turn; LANES],
+}
+
+impl Share {
+    const NONE: Self = Self { weight: F64x16::ZERO, matrix: [F64x16::ZERO; 9], turns: [[0.0; 4]; LANES] };
 }
 
 /// What is known of sixteen hairs while they are turned. Hairs are read and written one by one, each along its CVs: across
@@ -140,7 +146,7 @@ impl<'a> HairLanes<'a> {
     #[inline(always)]
     fn gather(&self, shares: &mut Vec<Share>) -> [F64x16; 3] {
         let mut offset = [F64x16::ZERO; 3];
-        shares.resize(self.guides.len(), Share { weight: F64x16::ZERO, matrix: [F64x16::ZERO; 9] });
+        shares.resize(self.guides.len(), Share::NONE);
         for (guide, share) in self.guides.iter().zip(shares) {
             share.set(guide);
             let mut arm = [F64x16::ZERO; 3];
@@ -184,12 +190,17 @@ impl<'a> HairLanes<'a> {
 
     /// The mean rotations of the hairs' guides at the middle of a segment; `unguided` is the weight that no guide holds.
     #[inline(always)]
-    fn turns(&self, shares: &[Share], segment: usize, unguided: &F64x16) -> LaneTurns {
+    fn turns(&self, shares: &mut [Share], segment: usize, unguided: &F64x16) -> LaneTurns {
         let mut sum = LaneTurns([F64x16::ZERO; 4]);
         let places = &self.places[segment * shares.len()..];
-        for (share, places) in shares.iter().zip(places) {
-            let turns = self.how.turns.at(places);
-            sum.add_weighted(&turns, &share.weight, &share.matrix);
+        // All are looked up before the first is read: what is read at once, across what was just written, is waited for.
+        for (share, places) in shares.iter_mut().zip(places) {
+            for lane in 0..LANES {
+                share.turns[lane] = self.how.turns.at(places, lane);
+            }
+        }
+        for share in shares {
+            sum.add_weighted(&LaneTurns::side_by_side(&share.turns), &share.weight, &share.matrix);
         }
         for lane in 0..LANES {
             sum.0[0].0[lane] += unguided.0[lane];
@@ -221,7 +232,7 @@ impl<'a> HairLanes<'a> {
     fn heaviest(&self, lane: usize, places: &[LanePlaces]) -> [f64; 4] {
         for (guide, places) in self.guides.iter().zip(places) {
             if places.rows[lane] != NO_GUIDE {
-                let turn = self.how.turns.at(places).get(lane);
+                let turn = self.how.turns.at(places, lane);
                 let [x, y, z, w] = get(&guide.rotation, lane);
                 let rotation = Unit::new_unchecked(Quaternion::new(w, x, y, z).cast::<f64>());
                 let axis = rotation * DVec3::new(turn[1], turn[2], turn[3]);
@@ -296,11 +307,9 @@ impl<'a> HairLanes<'a> {
     #[inline(always)]
     fn write(&self, scratch: &Scratch, base: usize, out: &mut [Vec3]) {
         for lane in 0..LANES {
-            let first = self.root[lane].wrapping_sub(base);
-            if self.cvs[lane] > 0 {
-                for (point, cv) in out[first..first + self.cvs[lane]].iter_mut().zip(&scratch.now) {
-                    *point = get(cv, lane);
-                }
+            // By index: an iterator becomes gathers, which take longer.
+            for cv in 0..self.cvs[lane] {
+                out[self.root[lane] + cv - base] = get(&scratch.now[cv], lane);
             }
         }
     }
@@ -331,7 +340,7 @@ impl Share {
     /// Replaces it by that of a guide.
     #[inline(always)]
     fn set(&mut self, guide: &LaneGuides) {
-        let Self { weight, matrix } = self;
+        let Self { weight, matrix, .. } = self;
         for lane in 0..LANES {
             weight.0[lane] = f64::from(guide.weight.0[lane]);
         }

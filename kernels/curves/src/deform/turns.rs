@@ -9,7 +9,7 @@ use numerics::vector::{self, DQuat, DVec3, to_f32, to_f64};
 
 /// A rotation as w, x, y, z. Along a guide its sign is continuous: turns of more than half a revolution are kept
 /// apart from the lesser ones with the same result.
-type Turn = [f64; 4];
+pub(super) type Turn = [f64; 4];
 
 /// Rotations of sixteen segments, side by side: w, x, y, z.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +20,18 @@ impl LaneTurns {
     #[inline(always)]
     pub(super) fn none() -> Self {
         Self([F64x16([1.0; LANES]), F64x16::ZERO, F64x16::ZERO, F64x16::ZERO])
+    }
+
+    /// Those of sixteen.
+    #[inline(always)]
+    pub(super) fn side_by_side(turns: &[Turn; LANES]) -> Self {
+        let mut out = Self([F64x16::ZERO; 4]);
+        for part in 0..4 {
+            for lane in 0..LANES {
+                out.0[part].0[lane] = turns[lane][part];
+            }
+        }
+        out
     }
 
     #[inline(always)]
@@ -215,23 +227,15 @@ impl GuideTurns {
         &self.offsets[guide as usize]
     }
 
-    /// The rotations at places on guides, interpolated between the middles of their segments.
+    /// The rotation at the place on a guide of one lane, interpolated between the middles of the guide's segments.
     #[inline(always)]
-    pub(super) fn at(&self, places: &LanePlaces) -> LaneTurns {
-        let mut turns = [STILL; LANES];
-        for lane in 0..LANES {
-            let Row { here, step } = &self.rows[places.rows[lane] as usize];
-            for part in 0..4 {
-                turns[lane][part] = here[part] + step[part] * places.shares.0[lane];
-            }
-        }
-        let mut out = LaneTurns([F64x16::ZERO; 4]);
+    pub(super) fn at(&self, places: &LanePlaces, lane: usize) -> Turn {
+        let Row { here, step } = &self.rows[places.rows[lane] as usize];
+        let mut turn = *here;
         for part in 0..4 {
-            for lane in 0..LANES {
-                out.0[part].0[lane] = turns[lane][part];
-            }
+            turn[part] += step[part] * places.shares.0[lane];
         }
-        out
+        turn
     }
 }
 
