@@ -15,7 +15,7 @@
 use curves::attach::{RootPose, RootPositions, SkinBinding, rotate_orientations, rotate_vectors};
 use curves::collide::{Clearance, KeepOut, KeptOut, keep_out};
 use curves::deform::{
-    CurveDeform, DeformedCurves, GuideSegments, GuideTurns, carried_poses, deform_curves, guide_poses, segment_middles,
+    CurveDeform, DeformedCurves, GuideSegments, GuideTurns, HairGuides, carried_poses, deform_curves, guide_poses,
 };
 use curves::guides::{GuideWeights, MAX_GUIDES, OrientedPoint, guide_weights};
 use engine::prelude::*;
@@ -218,8 +218,7 @@ fn deformed(
     let positions = [rest.positions(), now.positions()];
     let turns = GuideTurns::new(&bound.segments, rest.runs().starts(), positions, on_skin.guides());
     let how = CurveDeform {
-        weights: &bound.weights,
-        middles: &bound.middles,
+        guides: &bound.guides,
         turns: &turns,
         poses: on_skin.hairs(),
         blend: cx.mask(BLEND, curves)?,
@@ -284,8 +283,8 @@ impl PartialEq for BoundKey {
 /// The guides of each curve: the same at every frame.
 struct Bound {
     weights: GuideWeights,
-    /// Of each segment, along its curve.
-    middles: Vec<f64>,
+    /// The same, and where each segment is along them.
+    guides: HairGuides,
     /// Of the guides.
     segments: GuideSegments,
     /// Of the curves, metres.
@@ -324,11 +323,12 @@ impl Bound {
         // Without guides there are no weights.
         let unguided = |hair: &usize| weights.hairs() == 0 || weights.of(*hair).iter().all(|guide| guide.weight == 0.0);
         let far = |binding: &SkinBinding, part: &Component| binding.far_roots(part.runs().starts(), part.positions());
+        let segments = GuideSegments::of(guides.runs().starts(), guides.positions());
         Ok(Self {
+            guides: HairGuides::of(&weights, &segments, curves.runs().starts(), curves.positions()),
             unguided: (0..curves.element_count()).filter(unguided).count(),
             weights,
-            middles: segment_middles(curves.runs().starts(), curves.positions()),
-            segments: GuideSegments::of(guides.runs().starts(), guides.positions()),
+            segments,
             mean_length: mean_length(curves),
             far_roots: on_skin.as_ref().map_or(0, |(hairs, posts)| far(hairs, curves) + far(posts, guides)),
             on_skin,

@@ -172,7 +172,7 @@ const MANY: f64 = 20.0;
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Wind_Collision",
-    11,
+    12,
     "Keeps curves that are bent by wind out of colliders. Each segment, root to tip, turns from its rest direction \
      towards the direction that the wind gave it, until it touches a collider. Place this node after the wind, and wire \
      the curves from before the wind into `rest`. Attributes of each curve: `unfreed`, the number of segments that still \

@@ -36,7 +36,7 @@ mod triangle_lanes;
 
 pub use binding::{SkinBinding, closest_triangles};
 pub use pose::{AttachedCurves, RootPose, attach_curves, rotate_orientations, rotate_vectors};
-pub(crate) use pose::{attach_curve, relative_stretch, rotate_orientation, tasks};
+pub(crate) use pose::{attach_curve, relative_stretch, rotate_orientation};
 pub use root_positions::RootPositions;
 pub use rotation::nearest_rotation;
 

@@ -59,7 +59,9 @@ impl Ground {
             return *goal;
         }
         let share = (low - lowest) / (FRAC_PI_2 - lowest);
-        let room = 1.0 - lowest / FRAC_PI_2;
+        // Not 1 − lowest ÷ (π ÷ 2), which is a half at 45°: there a goal straight down is led nowhere, and one that passes it turns
+        // over. This is so at 64°, where a segment hangs steeply and what turns over is small.
+        let room = 1.0 - (lowest / FRAC_PI_2) * (lowest / FRAC_PI_2);
         let edge = |towards: &DVec3| {
             let aside = (towards - n * towards.dot(n)).try_normalize(1e-9);
             aside.map(|aside| aside * libm::cos(lowest) - n * libm::sin(lowest))

@@ -14,12 +14,12 @@
 use super::crossing::crosses_block;
 use super::hair::SKIPPED_GAPS;
 use super::half_space::HalfSpace;
-use super::kept_half_spaces::KeptHalfSpaces;
+use super::kept_half_spaces::{BATCH_CURVES, KeptHalfSpaces};
 use super::segment_turn::{Nearby, gather};
 use super::{Collide, ContactMethod, SkinSurface, collide};
 use crate::attach::{RootPose, attach_curve, relative_stretch};
-pub(crate) use clear_lanes::ClearLanes;
-use numerics::lanes::{F32x16, LANES, Lanes, set};
+use clear_lanes::{ClearBounds, ClearLanes};
+use numerics::lanes::{F32x16, LANES, set};
 use numerics::masked::Masked;
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
@@ -27,6 +27,7 @@ use numerics::tree::TriangleTree;
 use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
 use settle::{Entered, settle};
 use std::ops::Range;
+use std::sync::OnceLock;
 
 mod clear_lanes;
 mod settle;
@@ -65,6 +66,8 @@ pub struct KeepOut<'a> {
 #[derive(Debug)]
 pub struct Clearance {
     half_spaces: KeptHalfSpaces,
+    /// Of the curves of each of its batches, sixteen at a time.
+    bounds: Vec<OnceLock<Vec<ClearBounds>>>,
 }
 
 /// What [`keep_out`] did.
@@ -201,14 +204,33 @@ impl KeepOut<'_> {
     /// # Panics
     /// As [`keep_out`].
     pub fn prepare(&self, starts: &[u32]) {
-        self.clearance.half_spaces.used(|curves, found| look_up(Path::chosen(), curves, starts, self, found));
+        let Clearance { half_spaces, bounds } = self.clearance;
+        half_spaces.used(|curves, found| {
+            look_up(Path::chosen(), curves.clone(), starts, self, found);
+            let sixteens = curves.clone().step_by(LANES).zip(found.chunks(LANES));
+            let of_batch = sixteens.map(|(first, found)| self.bounds(first, starts, found)).collect();
+            let _ = bounds[curves.start / BATCH_CURVES].set(of_batch);
+        });
     }
 
-    /// Up to sixteen curves, to find out which of them are clear; `root` is where their rest shapes have their roots on the
-    /// skin as it is now.
+    /// The bounds of the curves from `first` on, which have these half-spaces.
+    fn bounds(&self, first: usize, starts: &[u32], half_spaces: &[HalfSpace]) -> ClearBounds {
+        let mut root = [F32x16::splat(0.0); 3];
+        for lane in 0..half_spaces.len() {
+            let cvs = starts[first + lane]..starts[first + lane + 1];
+            if !cvs.is_empty() {
+                set(&mut root, lane, to_f32(self.root(first + lane, cvs.start as usize)));
+            }
+        }
+        ClearBounds::of(root, half_spaces, self.gap)
+    }
+
+    /// Sixteen curves or what is left of all from `first`, a multiple of sixteen, on, to find out which of them are clear;
+    /// `None` if nothing is known of them.
     #[inline(always)]
-    pub(crate) fn lanes(&self, curves: Range<usize>, root: &Lanes<3>) -> ClearLanes {
-        ClearLanes::of(curves, root, &self.clearance.half_spaces, self.gap)
+    pub(crate) fn lanes(&self, first: usize) -> Option<ClearLanes<'_>> {
+        let bounds = self.clearance.bounds[first / BATCH_CURVES].get()?.get(first % BATCH_CURVES / LANES)?;
+        Some(ClearLanes::of(bounds, self.gap))
     }
 
     /// Whether a curve's root, `now`, is off the skin, on which `root` is.
@@ -263,7 +285,8 @@ impl KeepOut<'_> {
 impl Clearance {
     /// Of this many curves, of which nothing is known yet.
     pub fn of(curves: usize) -> Self {
-        Self { half_spaces: KeptHalfSpaces::of(curves) }
+        let bounds = (0..curves.div_ceil(BATCH_CURVES)).map(|_| OnceLock::new()).collect();
+        Self { half_spaces: KeptHalfSpaces::of(curves), bounds }
     }
 }
 
@@ -302,18 +325,20 @@ kernel! { avx512
 fn clear_curves_task(curves: Range<usize>, starts: &[u32], points: &[Vec3], how: &KeepOut<'_>, clear: &mut Vec<bool>) {
     for first in curves.clone().step_by(LANES) {
         let hairs = LANES.min(curves.end - first);
+        let Some(mut lanes) = how.lanes(first) else {
+            clear.resize(clear.len() + hairs, false);
+            continue;
+        };
         let mut cvs = [0; LANES];
-        let (mut root, mut cv, mut most) = ([F32x16::splat(0.0); 3], [F32x16::splat(0.0); 3], 0);
+        let (mut cv, mut most) = ([F32x16::splat(0.0); 3], 0);
         for lane in 0..hairs {
             let start = starts[first + lane] as usize;
             cvs[lane] = starts[first + lane + 1] as usize - start;
             most = most.max(cvs[lane]);
             if cvs[lane] > 0 {
-                set(&mut root, lane, to_f32(how.root(first + lane, start)));
                 set(&mut cv, lane, points[start]);
             }
         }
-        let mut lanes = how.lanes(first..first + hairs, &root);
         for k in 1..most {
             let before = cv;
             for lane in 0..hairs {

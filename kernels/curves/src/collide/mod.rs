@@ -30,7 +30,6 @@ mod turn_axes;
 
 use coherence::Ground;
 use hair::{Hair, Scratch};
-pub(crate) use keep_out::ClearLanes;
 pub use keep_out::{Clearance, KeepOut, KeptOut, keep_out};
 use numerics::masked::Masked;
 use numerics::parallel;

@@ -1,12 +1,12 @@
 //! Sixteen hairs side by side, turned as their guides are.
 
+use super::hair_guides::{LaneGuides, LanePlaces};
 use super::hairs::{CurveDeform, DeformedCurves};
-use super::turns::{LaneRows, LaneTurns, NO_GUIDE};
+use super::turns::{LaneTurns, NO_GUIDE, Turn};
 use crate::attach::RootPose;
-use crate::collide::ClearLanes;
 use nalgebra::{Quaternion, Unit};
 use numerics::lanes::{F32x16, F64x16, LANES, Lanes, get, set};
-use numerics::vector::{DQuat, DVec3, Vec3, to_f32};
+use numerics::vector::{DQuat, DVec3, Vec3};
 use std::ops::Range;
 
 /// Below this the sum of rotations has cancelled, and the guide with the largest weight decides.
@@ -16,18 +16,36 @@ const CANCELLED: f64 = 1e-9;
 const WEIGHT_ROUNDING: f64 = 1e-6;
 
 /// What one guide of each hair contributes.
+#[derive(Clone)]
 pub(super) struct Share {
     weight: F64x16,
     /// The weight times the rotation from the guide's frame to the hair's, row by row.
     matrix: [F64x16; 9],
-    /// Where the last lookup ended; see [`super::GuideTurns::at`].
-    at: LaneRows,
+    /// The guides' rotations at the segment that is turned.
+    turns: [Turn; LANES],
+}
+
+impl Share {
+    const NONE: Self = Self { weight: F64x16::ZERO, matrix: [F64x16::ZERO; 9], turns: [[0.0; 4]; LANES] };
+}
+
+/// What is known of sixteen hairs while they are turned. Hairs are read and written one by one, each along its CVs: across
+/// them, sixteen at a time, each number would need its own index.
+#[derive(Default)]
+pub(super) struct Scratch {
+    shares: Vec<Share>,
+    /// CVs at rest and displaced, as they are written; hairs with fewer repeat their last.
+    rest: Vec<Lanes<3>>,
+    now: Vec<Lanes<3>>,
 }
 
 /// Up to sixteen successive hairs.
 pub(super) struct HairLanes<'a> {
     how: &'a CurveDeform<'a>,
     rest: &'a [Vec3],
+    guides: &'a [LaneGuides],
+    places: &'a [LanePlaces],
+    /// A multiple of sixteen.
     first: usize,
     /// Number of hairs.
     hairs: usize,
@@ -45,14 +63,16 @@ impl<'a> HairLanes<'a> {
             let (from, to) = (starts[curves.start + lane] as usize, starts[curves.start + lane + 1] as usize);
             (root[lane], cvs[lane]) = (from, to - from);
         }
-        Self { how, rest, first: curves.start, hairs: curves.len(), root, cvs }
+        let (guides, places) = how.guides.lanes(curves.start);
+        Self { how, rest, guides, places, first: curves.start, hairs: curves.len(), root, cvs }
     }
 
     /// Writes the hairs to `out`, whose first row is `base` of all, and the rotation of each CV to those `done` unless there
     /// are none; adds the largest stretch, and which hairs are clear if that is wanted.
     #[inline(always)]
-    pub(super) fn follow(&self, shares: &mut Vec<Share>, base: usize, out: &mut [Vec3], done: &mut DeformedCurves) {
-        let mut displacement = self.gather(shares);
+    pub(super) fn follow(&self, scratch: &mut Scratch, base: usize, out: &mut [Vec3], done: &mut DeformedCurves) {
+        self.read(scratch);
+        let mut displacement = self.gather(&mut scratch.shares);
         let part = self.blends(0);
         for axis in 0..3 {
             for lane in 0..LANES {
@@ -63,17 +83,20 @@ impl<'a> HairLanes<'a> {
         if let Some(poses) = self.how.poses {
             still = Some(self.place_roots(poses, &mut displacement));
         }
-        let unguided = unguided(shares);
-        let mut rest = [F64x16::ZERO; 3];
-        self.read(0, &mut rest);
-        let mut now = self.write(0, [&rest, &displacement], base, out);
-        let mut clear = self.clear_lanes(&rest);
+        let unguided = unguided(&scratch.shares);
         let (mut whole, mut largest) = (F64x16::ZERO, F64x16::ZERO);
-        for segment in 0..self.most_cvs().saturating_sub(1) {
+        let Scratch { shares, rest: cvs, now: moved } = scratch;
+        let (mut rest, mut now) = ([F64x16::ZERO; 3], [F32x16::splat(0.0); 3]);
+        for (k, (cv, out)) in cvs.iter().zip(&mut *moved).enumerate() {
+            let (from, before) = (rest, now);
+            rest = widened(cv);
+            let Some(segment) = k.checked_sub(1) else {
+                now = displaced(cv, &displacement);
+                *out = now;
+                continue;
+            };
             let mut turns = self.turns(shares, segment, &unguided);
             self.take_part(&mut turns, segment);
-            let (from, before) = (rest, now);
-            self.read(segment + 1, &mut rest);
             let along = difference(&rest, &from);
             let mut turned = turns.rotate(&along);
             if let Some(still) = &still {
@@ -84,10 +107,8 @@ impl<'a> HairLanes<'a> {
                     displacement[axis].0[lane] += turned[axis].0[lane] - along[axis].0[lane];
                 }
             }
-            now = self.write(segment + 1, [&rest, &displacement], base, out);
-            if let Some(clear) = &mut clear {
-                clear.add(segment + 1, &before, &now);
-            }
+            now = displaced(cv, &displacement);
+            *out = now;
             self.write_rotations(segment, &turns, base, &mut done.rotations);
             let (length, new) = (lengths(&along), lengths(&difference(&widened(&now), &widened(&before))));
             for lane in 0..LANES {
@@ -100,59 +121,41 @@ impl<'a> HairLanes<'a> {
             let share = if whole.0[lane] > 0.0 { largest.0[lane] / whole.0[lane] } else { 0.0 };
             done.length_error = if share > done.length_error { share } else { done.length_error };
         }
-        if let Some(clear) = clear {
-            let mask = clear.mask();
-            for lane in 0..self.hairs {
-                done.clear.push(mask >> lane & 1 == 1 && self.cvs[lane] >= 2);
-            }
-        }
+        self.write(scratch, base, out);
+        self.add_clear(scratch, done);
     }
 
-    /// Which hairs are clear of what they are kept out of, if that is wanted.
+    /// Adds which hairs are clear of what they are kept out of, if that is wanted.
     #[inline(always)]
-    fn clear_lanes(&self, roots: &[F64x16; 3]) -> Option<ClearLanes> {
-        let keep_out = self.how.keep_out?;
-        let mut root = [F32x16::splat(0.0); 3];
-        for lane in 0..self.hairs {
-            let mut at = DVec3::new(roots[0].0[lane], roots[1].0[lane], roots[2].0[lane]);
-            if let Some(poses) = self.how.poses {
-                at += poses[self.first + lane].translation;
-            }
-            set(&mut root, lane, to_f32(at));
+    fn add_clear(&self, scratch: &Scratch, done: &mut DeformedCurves) {
+        let Some(keep_out) = self.how.keep_out else { return };
+        let Some(mut clear) = keep_out.lanes(self.first) else {
+            done.clear.resize(done.clear.len() + self.hairs, false);
+            return;
+        };
+        for (k, ends) in scratch.now.windows(2).enumerate() {
+            clear.add(k + 1, &ends[0], &ends[1]);
         }
-        Some(keep_out.lanes(self.first..self.first + self.hairs, &root))
+        let mask = clear.mask();
+        for lane in 0..self.hairs {
+            done.clear.push(mask >> lane & 1 == 1 && self.cvs[lane] >= 2);
+        }
     }
 
-    /// Collects the hairs' guides; returns the mean offset of their roots, in the frames of the hairs.
+    /// Finds what the hairs' guides contribute; returns the mean offset of their roots, in the frames of the hairs.
     #[inline(always)]
     fn gather(&self, shares: &mut Vec<Share>) -> [F64x16; 3] {
-        shares.clear();
         let mut offset = [F64x16::ZERO; 3];
-        if self.how.weights.hairs() == 0 || self.hairs == 0 {
-            return offset;
-        }
-        for rank in 0..self.how.weights.of(self.first).len() {
-            let mut rotation = [F64x16::ZERO, F64x16::ZERO, F64x16::ZERO, F64x16([1.0; LANES])];
+        shares.resize(self.guides.len(), Share::NONE);
+        for (guide, share) in self.guides.iter().zip(shares) {
+            share.set(guide);
             let mut arm = [F64x16::ZERO; 3];
-            let (mut weight, mut firsts) = (F64x16::ZERO, [NO_GUIDE; LANES]);
-            for lane in 0..self.hairs {
-                let guide = &self.how.weights.of(self.first + lane)[rank];
-                if guide.weight <= 0.0 {
-                    continue;
-                }
-                firsts[lane] = self.how.turns.first(guide.guide as usize);
-                weight.0[lane] = f64::from(guide.weight);
-                for part in 0..4 {
-                    rotation[part].0[lane] = f64::from(guide.rotation[part]);
-                }
-                let moved = self.how.turns.offset(guide.guide as usize);
+            for lane in 0..LANES {
+                let moved = self.how.turns.offset(guide.guide[lane]);
                 for axis in 0..3 {
                     arm[axis].0[lane] = moved[axis];
                 }
             }
-            shares.push(Share { weight, matrix: [F64x16::ZERO; 9], at: self.how.turns.start(firsts) });
-            let share = &mut shares[rank];
-            share.set_matrix(&rotation);
             for row in 0..3 {
                 let [a, b, c] = [&share.matrix[3 * row], &share.matrix[3 * row + 1], &share.matrix[3 * row + 2]];
                 for lane in 0..LANES {
@@ -189,10 +192,15 @@ impl<'a> HairLanes<'a> {
     #[inline(always)]
     fn turns(&self, shares: &mut [Share], segment: usize, unguided: &F64x16) -> LaneTurns {
         let mut sum = LaneTurns([F64x16::ZERO; 4]);
-        let middles = self.middles(segment);
-        for share in shares.iter_mut() {
-            let turns = self.how.turns.at(&middles, &mut share.at);
-            sum.add_weighted(&turns, &share.weight, &share.matrix);
+        let places = &self.places[segment * shares.len()..];
+        // All are looked up before the first is read: what is read at once, across what was just written, is waited for.
+        for (share, places) in shares.iter_mut().zip(places) {
+            for lane in 0..LANES {
+                share.turns[lane] = self.how.turns.at(places, lane);
+            }
+        }
+        for share in shares {
+            sum.add_weighted(&LaneTurns::side_by_side(&share.turns), &share.weight, &share.matrix);
         }
         for lane in 0..LANES {
             sum.0[0].0[lane] += unguided.0[lane];
@@ -204,29 +212,32 @@ impl<'a> HairLanes<'a> {
                 unit.0[part].0[lane] /= sizes.0[lane];
             }
         }
-        for lane in 0..self.hairs {
-            if sizes.0[lane] <= CANCELLED || sizes.0[lane].is_nan() {
-                unit.put(lane, &self.heaviest(lane, &middles));
+        // Looked for on all lanes at once: there are hardly ever any.
+        let mut cancelled = F64x16::ZERO;
+        for lane in 0..LANES {
+            cancelled.0[lane] = if sizes.0[lane] > CANCELLED { 0.0 } else { 1.0 };
+        }
+        if cancelled != F64x16::ZERO {
+            for lane in 0..self.hairs {
+                if cancelled.0[lane] > 0.0 {
+                    unit.put(lane, &self.heaviest(lane, places));
+                }
             }
         }
         unit
     }
 
-    /// The rotation, at a fraction of its length, of the guide with the largest weight that has one.
+    /// The rotation, at one of these places, of the guide with the largest weight that has one.
     #[inline(always)]
-    fn heaviest(&self, lane: usize, fractions: &F64x16) -> [f64; 4] {
-        if self.how.weights.hairs() > 0 {
-            for guide in self.how.weights.of(self.first + lane) {
-                let row = self.how.turns.first(guide.guide as usize);
-                if guide.weight > 0.0 && row != NO_GUIDE {
-                    let turns = self.how.turns;
-                    let turn = turns.at(fractions, &mut turns.start([row; LANES])).get(lane);
-                    let [x, y, z, w] = guide.rotation;
-                    let rotation = Unit::new_unchecked(Quaternion::new(w, x, y, z).cast::<f64>());
-                    let axis = rotation * DVec3::new(turn[1], turn[2], turn[3]);
-                    let size = (turn[0] * turn[0] + axis.norm_squared()).sqrt();
-                    return [turn[0] / size, axis.x / size, axis.y / size, axis.z / size];
-                }
+    fn heaviest(&self, lane: usize, places: &[LanePlaces]) -> [f64; 4] {
+        for (guide, places) in self.guides.iter().zip(places) {
+            if places.rows[lane] != NO_GUIDE {
+                let turn = self.how.turns.at(places, lane);
+                let [x, y, z, w] = get(&guide.rotation, lane);
+                let rotation = Unit::new_unchecked(Quaternion::new(w, x, y, z).cast::<f64>());
+                let axis = rotation * DVec3::new(turn[1], turn[2], turn[3]);
+                let size = (turn[0] * turn[0] + axis.norm_squared()).sqrt();
+                return [turn[0] / size, axis.x / size, axis.y / size, axis.z / size];
             }
         }
         [1.0, 0.0, 0.0, 0.0]
@@ -268,56 +279,39 @@ impl<'a> HairLanes<'a> {
         blends
     }
 
-    /// The middles of segments; 0 where there is none.
+    /// Reads the CVs at rest.
     #[inline(always)]
-    fn middles(&self, segment: usize) -> F64x16 {
-        let mut middles = F64x16::ZERO;
-        for lane in 0..self.hairs {
-            if segment + 1 < self.cvs[lane] {
-                // Hairs before this one have a segment less than CVs.
-                middles.0[lane] = self.how.middles[self.root[lane] - (self.first + lane) + segment];
-            }
-        }
-        middles
-    }
-
-    #[inline(always)]
-    fn most_cvs(&self) -> usize {
+    fn read(&self, scratch: &mut Scratch) {
         let mut most = 0;
         for cvs in self.cvs {
             most = if cvs > most { cvs } else { most };
         }
-        most
-    }
-
-    /// Reads the CVs `cv` at rest; lanes without one keep theirs.
-    #[inline(always)]
-    fn read(&self, cv: usize, rest: &mut [F64x16; 3]) {
-        for lane in 0..self.hairs {
-            if cv < self.cvs[lane] {
-                let p = self.rest[self.root[lane] + cv];
-                for axis in 0..3 {
-                    rest[axis].0[lane] = f64::from(p[axis]);
-                }
+        let Scratch { rest, now, .. } = scratch;
+        now.resize(most, [F32x16::splat(0.0); 3]);
+        rest.resize(most, [F32x16::splat(0.0); 3]);
+        for lane in 0..LANES {
+            let points = &self.rest[self.root[lane]..self.root[lane] + self.cvs[lane]];
+            let (mine, others) = rest.split_at_mut(points.len());
+            let mut last = [0.0; 3];
+            for (cv, point) in mine.iter_mut().zip(points) {
+                last = *point;
+                set(cv, lane, last);
+            }
+            for cv in others {
+                set(cv, lane, last);
             }
         }
     }
 
-    /// Writes the CVs `cv`, displaced; returns what is written.
+    /// Writes the displaced CVs.
     #[inline(always)]
-    fn write(&self, cv: usize, [rest, displacement]: [&[F64x16; 3]; 2], base: usize, out: &mut [Vec3]) -> Lanes<3> {
-        let mut rounded = [F32x16::splat(0.0); 3];
-        for axis in 0..3 {
-            for lane in 0..LANES {
-                rounded[axis].0[lane] = (rest[axis].0[lane] + displacement[axis].0[lane]) as f32;
+    fn write(&self, scratch: &Scratch, base: usize, out: &mut [Vec3]) {
+        for lane in 0..LANES {
+            // By index: an iterator becomes gathers, which take longer.
+            for cv in 0..self.cvs[lane] {
+                out[self.root[lane] + cv - base] = get(&scratch.now[cv], lane);
             }
         }
-        for lane in 0..self.hairs {
-            if cv < self.cvs[lane] {
-                out[self.root[lane] + cv - base] = get(&rounded, lane);
-            }
-        }
-        rounded
     }
 
     /// Writes the rotations of the CVs at the start of segments, and of those at the end, which have the same unless they
@@ -343,22 +337,28 @@ impl<'a> HairLanes<'a> {
 }
 
 impl Share {
-    /// Its matrix, from the rotations x, y, z, w.
+    /// Replaces it by that of a guide.
     #[inline(always)]
-    fn set_matrix(&mut self, [x, y, z, w]: &[F64x16; 4]) {
+    fn set(&mut self, guide: &LaneGuides) {
+        let Self { weight, matrix, .. } = self;
         for lane in 0..LANES {
-            let (x, y, z, w, weight) = (x.0[lane], y.0[lane], z.0[lane], w.0[lane], self.weight.0[lane]);
+            weight.0[lane] = f64::from(guide.weight.0[lane]);
+        }
+        let [x, y, z, w] = &guide.rotation;
+        for lane in 0..LANES {
+            let (x, y, z, w) = (f64::from(x.0[lane]), f64::from(y.0[lane]), f64::from(z.0[lane]), f64::from(w.0[lane]));
+            let weight = weight.0[lane];
             // Divided by its squared length, which rounding to f32 made unequal to 1.
             let twice = 2.0 / (DVec3::new(x, y, z).norm_squared() + w * w);
-            self.matrix[0].0[lane] = (1.0 - twice * (y * y + z * z)) * weight;
-            self.matrix[1].0[lane] = twice * (x * y - w * z) * weight;
-            self.matrix[2].0[lane] = twice * (x * z + w * y) * weight;
-            self.matrix[3].0[lane] = twice * (x * y + w * z) * weight;
-            self.matrix[4].0[lane] = (1.0 - twice * (x * x + z * z)) * weight;
-            self.matrix[5].0[lane] = twice * (y * z - w * x) * weight;
-            self.matrix[6].0[lane] = twice * (x * z - w * y) * weight;
-            self.matrix[7].0[lane] = twice * (y * z + w * x) * weight;
-            self.matrix[8].0[lane] = (1.0 - twice * (x * x + y * y)) * weight;
+            matrix[0].0[lane] = (1.0 - twice * (y * y + z * z)) * weight;
+            matrix[1].0[lane] = twice * (x * y - w * z) * weight;
+            matrix[2].0[lane] = twice * (x * z + w * y) * weight;
+            matrix[3].0[lane] = twice * (x * y + w * z) * weight;
+            matrix[4].0[lane] = (1.0 - twice * (x * x + z * z)) * weight;
+            matrix[5].0[lane] = twice * (y * z - w * x) * weight;
+            matrix[6].0[lane] = twice * (x * z - w * y) * weight;
+            matrix[7].0[lane] = twice * (y * z + w * x) * weight;
+            matrix[8].0[lane] = (1.0 - twice * (x * x + y * y)) * weight;
         }
     }
 }
@@ -384,6 +384,18 @@ fn difference(a: &[F64x16; 3], b: &[F64x16; 3]) -> [F64x16; 3] {
     for axis in 0..3 {
         for lane in 0..LANES {
             out[axis].0[lane] = a[axis].0[lane] - b[axis].0[lane];
+        }
+    }
+    out
+}
+
+/// Points moved.
+#[inline(always)]
+fn displaced(points: &Lanes<3>, displacement: &[F64x16; 3]) -> Lanes<3> {
+    let mut out = [F32x16::splat(0.0); 3];
+    for axis in 0..3 {
+        for lane in 0..LANES {
+            out[axis].0[lane] = (f64::from(points[axis].0[lane]) + displacement[axis].0[lane]) as f32;
         }
     }
     out

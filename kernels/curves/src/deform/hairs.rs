@@ -1,10 +1,10 @@
 //! Hairs turned as their guides are.
 
-use super::hair_lanes::HairLanes;
+use super::hair_guides::HairGuides;
+use super::hair_lanes::{HairLanes, Scratch};
 use super::turns::GuideTurns;
-use crate::attach::{RootPose, tasks};
+use crate::attach::RootPose;
 use crate::collide::KeepOut;
-use crate::guides::GuideWeights;
 use numerics::lanes::LANES;
 use numerics::masked::Masked;
 use numerics::parallel;
@@ -16,12 +16,9 @@ use std::ops::Range;
 #[derive(Clone, Copy)]
 pub struct CurveDeform<'a> {
     /// The guides of each hair.
-    pub weights: &'a GuideWeights,
-    /// For each segment of the hairs its middle, from 0 at the root to 1 at the tip; see
-    /// [`super::segment_middles`].
-    pub middles: &'a [f64],
+    pub guides: &'a HairGuides,
     /// How the guides have turned.
-    pub turns: &'a GuideTurns<'a>,
+    pub turns: &'a GuideTurns,
     /// How the hairs' roots have moved and turned; `None` if they have not.
     pub poses: Option<&'a [RootPose]>,
     /// Fraction of the guides' turn that hairs follow, 0..1; a mask has one value for each CV.
@@ -73,6 +70,25 @@ pub(super) fn deform_curves_on(
     DeformedCurves { points, ..all }
 }
 
+/// CVs in a task: some 50 µs of work.
+const TASK: usize = 2048;
+
+/// The hairs of each task, in sixteens, and the rows of their CVs.
+fn tasks<'a>(starts: &[u32], mut out: &'a mut [Vec3]) -> Vec<(Range<usize>, &'a mut [Vec3])> {
+    let hairs = starts.len().saturating_sub(1);
+    let (mut tasks, mut first) = (Vec::new(), 0);
+    while first < hairs {
+        let mut end = hairs.min(first + LANES);
+        while end < hairs && ((starts[end] - starts[first]) as usize) < TASK {
+            end = hairs.min(end + LANES);
+        }
+        let (mine, after) = out.split_at_mut((starts[end] - starts[first]) as usize);
+        tasks.push((first..end, mine));
+        (out, first) = (after, end);
+    }
+    tasks
+}
+
 kernel! { avx512
     /// Deforms `curves` into `out`; returns all but the points, and rotations if they are wanted.
     fn follow(
@@ -95,7 +111,7 @@ fn follow_task(
     with_rotations: bool,
 ) -> DeformedCurves {
     let base = starts[curves.start] as usize;
-    let (mut done, mut shares) = (DeformedCurves::default(), Vec::new());
+    let (mut done, mut scratch) = (DeformedCurves::default(), Scratch::default());
     if with_rotations {
         // Of CVs that start no segment and end none.
         for curve in curves.clone() {
@@ -107,7 +123,7 @@ fn follow_task(
     while first < curves.end {
         let end = if curves.end - first > LANES { first + LANES } else { curves.end };
         let hairs = HairLanes::of(first..end, starts, rest, how);
-        hairs.follow(&mut shares, base, out, &mut done);
+        hairs.follow(&mut scratch, base, out, &mut done);
         first = end;
     }
     done

@@ -13,14 +13,16 @@
 //! lengths up to the rounding of positions; a hair that is a guide, alone at its root, becomes that guide; the same bits
 //! on any number of threads. f64 inside. Metres.
 
+mod hair_guides;
 mod hair_lanes;
 mod hairs;
 mod roots;
 mod turns;
 
+pub use hair_guides::HairGuides;
 pub use hairs::{CurveDeform, DeformedCurves, deform_curves};
 pub use roots::{carried_poses, guide_poses};
-pub use turns::{GuideSegments, GuideTurns, segment_middles};
+pub use turns::{GuideSegments, GuideTurns};
 
 #[cfg(test)]
 mod tests;

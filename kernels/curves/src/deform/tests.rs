@@ -58,10 +58,8 @@ fn weights(guides: &Curves, hairs: &Curves, count: usize) -> GuideWeights {
 fn deformed(hairs: &Curves, guides: [&Curves; 2], weights: &GuideWeights, blend: f32) -> Vec<Point> {
     let segments = GuideSegments::of(&guides[0].starts, &guides[0].points);
     let turns = GuideTurns::new(&segments, &guides[0].starts, [&guides[0].points, &guides[1].points], None);
-    let middles = segment_middles(&hairs.starts, &hairs.points);
     let how = CurveDeform {
-        weights,
-        middles: &middles,
+        guides: &HairGuides::of(weights, &segments, &hairs.starts, &hairs.points),
         turns: &turns,
         poses: None,
         blend: Masked::uniform(blend),
@@ -180,9 +178,9 @@ fn last_cvs_turn_with_their_segments() {
     let weights = weights(&guides[0], &hairs, 1);
     let segments = GuideSegments::of(&guides[0].starts, &guides[0].points);
     let turns = GuideTurns::new(&segments, &guides[0].starts, [&guides[0].points, &guides[1].points], None);
-    let middles = segment_middles(&hairs.starts, &hairs.points);
+    let guides = HairGuides::of(&weights, &segments, &hairs.starts, &hairs.points);
     let blend = Masked::uniform(1.0);
-    let how = CurveDeform { weights: &weights, middles: &middles, turns: &turns, poses: None, blend, keep_out: None };
+    let how = CurveDeform { guides: &guides, turns: &turns, poses: None, blend, keep_out: None };
     let turn = rotation(DVec3::z(), 0.7);
     for found in deform_curves(&hairs.starts, &hairs.points, &how, true).rotations {
         assert!((found.coords - turn.coords).amax() < 1e-6, "{found:?}");
@@ -201,11 +199,9 @@ fn rigid_motion_of_the_guides_moves_hairs_rigidly() {
         let poses = carried_poses(&weights, &hairs.roots(), &guides.roots(), &guide_poses);
         let segments = GuideSegments::of(&guides.starts, &guides.points);
         let turns = GuideTurns::new(&segments, &guides.starts, [&guides.points, &now.points], Some(&guide_poses));
-        let middles = segment_middles(&hairs.starts, &hairs.points);
         let blend = Masked::uniform(1.0);
         let how = CurveDeform {
-            weights: &weights,
-            middles: &middles,
+            guides: &HairGuides::of(&weights, &segments, &hairs.starts, &hairs.points),
             turns: &turns,
             poses: Some(&poses),
             blend,
@@ -251,11 +247,10 @@ fn lengths_are_kept_whatever_guides_do() {
     }
     let segments = GuideSegments::of(&guides.starts, &guides.points);
     let turns = GuideTurns::new(&segments, &guides.starts, [&guides.points, &now.points], None);
-    let (weights, middles) = (weights(&guides, &hairs, 3), segment_middles(&hairs.starts, &hairs.points));
+    let of_hairs = HairGuides::of(&weights(&guides, &hairs, 3), &segments, &hairs.starts, &hairs.points);
     for blend in [1.0, 0.3] {
         let blend = Masked::uniform(blend);
-        let how =
-            CurveDeform { weights: &weights, middles: &middles, turns: &turns, poses: None, blend, keep_out: None };
+        let how = CurveDeform { guides: &of_hairs, turns: &turns, poses: None, blend, keep_out: None };
         let deformed = deform_curves(&hairs.starts, &hairs.points, &how, false);
         assert!(deformed.points.as_flattened().iter().all(|x| x.is_finite()));
         assert!(deformed.length_error < 1e-5, "{}", deformed.length_error);

@@ -1,5 +1,6 @@
 //! How guides have turned since rest.
 
+use super::hair_guides::LanePlaces;
 use crate::attach::RootPose;
 use nalgebra::{Quaternion, Vector3};
 use numerics::lanes::{F64x16, LANES};
@@ -8,7 +9,7 @@ use numerics::vector::{self, DQuat, DVec3, to_f32, to_f64};
 
 /// A rotation as w, x, y, z. Along a guide its sign is continuous: turns of more than half a revolution are kept
 /// apart from the lesser ones with the same result.
-type Turn = [f64; 4];
+pub(super) type Turn = [f64; 4];
 
 /// Rotations of sixteen segments, side by side: w, x, y, z.
 #[derive(Clone, Copy, Debug)]
@@ -19,6 +20,18 @@ impl LaneTurns {
     #[inline(always)]
     pub(super) fn none() -> Self {
         Self([F64x16([1.0; LANES]), F64x16::ZERO, F64x16::ZERO, F64x16::ZERO])
+    }
+
+    /// Those of sixteen.
+    #[inline(always)]
+    pub(super) fn side_by_side(turns: &[Turn; LANES]) -> Self {
+        let mut out = Self([F64x16::ZERO; 4]);
+        for part in 0..4 {
+            for lane in 0..LANES {
+                out.0[part].0[lane] = turns[lane][part];
+            }
+        }
+        out
     }
 
     #[inline(always)]
@@ -128,20 +141,37 @@ impl GuideSegments {
     }
 
     /// The first row of a guide.
-    #[inline(always)]
     pub(super) fn first(&self, guide: usize) -> u32 {
         self.firsts[guide]
+    }
+
+    /// The row at a fraction of a guide's length, and how far that is towards the middle of the row after it, 0..1; `row` is
+    /// one of the same guide's for a smaller fraction.
+    pub(super) fn place(&self, row: u32, fraction: f64) -> (u32, f64) {
+        let mut row = row as usize;
+        while self.middles[row + 1] <= fraction {
+            row += 1;
+        }
+        let (here, next) = (self.middles[row], self.middles[row + 1]);
+        (row as u32, if fraction > here { (fraction - here) / (next - here) } else { 0.0 })
     }
 }
 
 /// The rotation of each segment of the guides since rest.
 #[derive(Clone, Debug, PartialEq)]
-pub struct GuideTurns<'a> {
-    segments: &'a GuideSegments,
+pub struct GuideTurns {
     /// Of each row, in the frame of the root of its guide; that which ends a guide repeats its last.
-    turns: Vec<Turn>,
-    /// From where the skin carries each root to where it is, in the same frame, metres.
+    rows: Vec<Row>,
+    /// From where the skin carries each root to where it is, in the same frame, metres. The first is that of no guide.
     offsets: Vec<DVec3>,
+}
+
+/// The rotation of a segment, and what is added to it up to the next segment's; on one line of the cache.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(align(64))]
+struct Row {
+    here: Turn,
+    step: Turn,
 }
 
 /// The rotation of what does not turn.
@@ -153,7 +183,7 @@ const TASK: usize = 64;
 /// Below this, of 1 + the cosine between two directions, their cross product has lost half of its digits.
 const OPPOSITE: f64 = 1e-10;
 
-impl<'a> GuideTurns<'a> {
+impl GuideTurns {
     /// The rotations of guides from `rest[starts[i]..starts[i + 1]]`, which have these `segments`, to the same ranges of
     /// `now`, whose roots' frames have moved by `poses` (`None`: not at all).
     ///
@@ -161,115 +191,52 @@ impl<'a> GuideTurns<'a> {
     /// If `starts` does not run from 0 to the number of points of both, there are fewer poses than guides, or `segments` are
     /// others.
     pub fn new(
-        segments: &'a GuideSegments,
+        segments: &GuideSegments,
         starts: &[u32],
         [rest, now]: [&[[f32; 3]]; 2],
         poses: Option<&[RootPose]>,
     ) -> Self {
         let guides = starts.len().saturating_sub(1);
-        let (mut turns, mut offsets) = (vec![STILL; segments.middles.len()], vec![DVec3::zeros(); guides]);
-        let mut left = &mut turns[2..];
+        let still = Row { here: STILL, step: [0.0; 4] };
+        let (mut rows, mut offsets) = (vec![still; segments.middles.len()], vec![DVec3::zeros(); guides + 1]);
+        let mut left = &mut rows[2..];
         let mut tasks = Vec::new();
-        for (first, offsets) in (0..guides).step_by(TASK).zip(offsets.chunks_mut(TASK)) {
+        for (first, offsets) in (0..guides).step_by(TASK).zip(offsets[1..].chunks_mut(TASK)) {
             let guides = first..first + offsets.len();
             let rows = guides.clone().map(|guide| rows_of(starts[guide + 1] - starts[guide])).sum();
             let (mine, others) = left.split_at_mut(rows);
             tasks.push((guides, mine, offsets));
             left = others;
         }
-        parallel::for_each(tasks, |_, (guides, mut turns, offsets)| {
+        parallel::for_each(tasks, |_, (guides, mut rows, offsets)| {
             for (guide, offset) in guides.zip(offsets) {
                 let cvs = starts[guide] as usize..starts[guide + 1] as usize;
                 let still = RootPose { translation: DVec3::zeros(), rotation: DQuat::identity(), lost: false };
                 let pose = poses.map_or(still, |poses| poses[guide]);
-                let (mine, others) = turns.split_at_mut(rows_of(starts[guide + 1] - starts[guide]));
+                let (mine, others) = rows.split_at_mut(rows_of(starts[guide + 1] - starts[guide]));
                 *offset = write_turns(&rest[cvs.clone()], &now[cvs], &pose, mine);
-                turns = others;
+                rows = others;
             }
         });
-        Self { segments, turns, offsets }
+        Self { rows, offsets }
     }
 
-    /// The first row of a guide.
+    /// The offset of the root of a guide, counted from 1; 0 for no guide.
     #[inline(always)]
-    pub(super) fn first(&self, guide: usize) -> u32 {
-        self.segments.first(guide)
+    pub(super) fn offset(&self, guide: u32) -> &DVec3 {
+        &self.offsets[guide as usize]
     }
 
+    /// The rotation at the place on a guide of one lane, interpolated between the middles of the guide's segments.
     #[inline(always)]
-    pub(super) fn offset(&self, guide: usize) -> &DVec3 {
-        &self.offsets[guide]
-    }
-
-    /// The first rows of guides, for [`GuideTurns::at`].
-    #[inline(always)]
-    pub(super) fn start(&self, firsts: [u32; LANES]) -> LaneRows {
-        let middles = &self.segments.middles[..];
-        let (mut here, mut next) = (F64x16::ZERO, F64x16::ZERO);
-        for lane in 0..LANES {
-            let row = firsts[lane] as usize;
-            let pair = &middles[row..row + 2];
-            (here.0[lane], next.0[lane]) = (pair[0], pair[1]);
-        }
-        LaneRows { rows: firsts, here, next }
-    }
-
-    /// The rotations at fractions of guides, interpolated between the middles of their segments; `at` is where the last call,
-    /// for smaller fractions, has come to.
-    ///
-    /// Without branches: the fractions of hairs whose segments end where those of guides do are a rounding above or below
-    /// the middles, which no CPU predicts.
-    #[inline(always)]
-    pub(super) fn at(&self, fractions: &F64x16, at: &mut LaneRows) -> LaneTurns {
-        let next = &self.segments.middles[1..];
-        loop {
-            let (mut is_past, mut passed) = ([0; LANES], 0);
-            for lane in 0..LANES {
-                is_past[lane] = u32::from(at.next.0[lane] <= fractions.0[lane]);
-                passed |= is_past[lane];
-            }
-            if passed == 0 {
-                break;
-            }
-            for lane in 0..LANES {
-                at.here.0[lane] = if is_past[lane] == 1 { at.next.0[lane] } else { at.here.0[lane] };
-                at.rows[lane] += is_past[lane];
-            }
-            for lane in 0..LANES {
-                at.next.0[lane] = next[at.rows[lane] as usize];
-            }
-        }
-        let mut shares = F64x16::ZERO;
-        for lane in 0..LANES {
-            let share = (fractions.0[lane] - at.here.0[lane]) / (at.next.0[lane] - at.here.0[lane]);
-            shares.0[lane] = if fractions.0[lane] > at.here.0[lane] { share } else { 0.0 };
-        }
-        let mut turns = [STILL; LANES];
-        for lane in 0..LANES {
-            let (row, share) = (at.rows[lane] as usize, shares.0[lane]);
-            // Both at once, so that the index is checked once.
-            let pair = &self.turns[row..row + 2];
-            let (here, next) = (pair[0], pair[1]);
-            for part in 0..4 {
-                turns[lane][part] = here[part] + (next[part] - here[part]) * share;
-            }
-        }
-        let mut out = LaneTurns([F64x16::ZERO; 4]);
+    pub(super) fn at(&self, places: &LanePlaces, lane: usize) -> Turn {
+        let Row { here, step } = &self.rows[places.rows[lane] as usize];
+        let mut turn = *here;
         for part in 0..4 {
-            for lane in 0..LANES {
-                out.0[part].0[lane] = turns[lane][part];
-            }
+            turn[part] += step[part] * places.shares.0[lane];
         }
-        out
+        turn
     }
-}
-
-/// Where sixteen hairs are on one guide each: the rows, and the middles of their segments and of the next.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct LaneRows {
-    rows: [u32; LANES],
-    here: F64x16,
-    next: F64x16,
 }
 
 /// Number of rows of a guide with so many CVs.
@@ -278,12 +245,12 @@ fn rows_of(cvs: u32) -> usize {
 }
 
 /// Writes the rotations of one guide's rows; returns the offset of its root.
-fn write_turns(rest: &[[f32; 3]], now: &[[f32; 3]], pose: &RootPose, turns: &mut [Turn]) -> DVec3 {
+fn write_turns(rest: &[[f32; 3]], now: &[[f32; 3]], pose: &RootPose, rows: &mut [Row]) -> DVec3 {
     let Some((first, moved)) = rest.first().zip(now.first()) else { return DVec3::zeros() };
     let back = pose.rotation.inverse();
     let mut turn = Quaternion::new(1.0, 0.0, 0.0, 0.0);
     let segment = |cvs: &[[f32; 3]], k: usize| (to_f64(cvs[k + 1]) - to_f64(cvs[k])).try_normalize(0.0);
-    for (k, out) in turns.iter_mut().enumerate() {
+    for (k, row) in rows.iter_mut().enumerate() {
         // A segment without a direction turns as the one before, and so does what ends the guide.
         if k + 1 < rest.len()
             && let (Some(from), Some(to)) = (segment(rest, k), segment(now, k))
@@ -291,7 +258,10 @@ fn write_turns(rest: &[[f32; 3]], now: &[[f32; 3]], pose: &RootPose, turns: &mut
             turn = smallest_rotation(&(rotated(&turn, &from)), &(back * to)) * turn;
             turn /= turn.norm();
         }
-        *out = [turn.w, turn.i, turn.j, turn.k];
+        row.here = [turn.w, turn.i, turn.j, turn.k];
+    }
+    for k in 1..rows.len() {
+        rows[k - 1].step = std::array::from_fn(|part| rows[k].here[part] - rows[k - 1].here[part]);
     }
     back * (to_f64(*moved) - (to_f64(*first) + pose.translation))
 }
@@ -317,7 +287,7 @@ fn smallest_rotation(from: &DVec3, to: &DVec3) -> Quaternion<f64> {
 ///
 /// # Panics
 /// If `starts` does not run from 0 to the number of points.
-pub fn segment_middles(starts: &[u32], points: &[[f32; 3]]) -> Vec<f64> {
+pub(super) fn segment_middles(starts: &[u32], points: &[[f32; 3]]) -> Vec<f64> {
     let of_curve = |curve: usize| {
         let cvs = &points[starts[curve] as usize..starts[curve + 1] as usize];
         let mut passed = 0.0;
