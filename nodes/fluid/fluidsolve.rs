@@ -223,7 +223,7 @@ metrics! { METRICS:
     SUNK = Metric::new("sunk", Unit::CubicMetres, "Volume that sinks have removed since the start.");
     PARTICLES_NOW = Metric::new("particles", Unit::None, "Number of points in the output `particles`.");
     COLLIDER_FORCE_X = Metric::new("collider_force_x", Unit::Newtons, "Total force of the liquid on all colliders along \
-        x, averaged over the frame.");
+        x, averaged over the frame. What stops in the last half cell before a collider does not count.");
     COLLIDER_FORCE_Y = Metric::new("collider_force_y", Unit::Newtons, "The same along y.");
     COLLIDER_FORCE_Z = Metric::new("collider_force_z", Unit::Newtons, "The same along z.");
     WITHHELD = Metric::new("withheld", Unit::CubicMetres,

@@ -24,7 +24,7 @@ pub(super) struct Projection<'a> {
     pub cells: &'a LiquidCells,
     pub materials: Materials,
     pub solid: Option<Obstacle<'a>>,
-    /// Those that the solid cuts, where the force on it is wanted.
+    /// The liquid cells that the solid cuts, where the force on it is wanted; else none.
     pub cut: &'a [CutCell],
     pub imposed: &'a [Imposed],
     /// The speed of the liquid, m/s.
