@@ -7,7 +7,7 @@ use crate::level_set::PhiView;
 use crate::rows::{Cell, CellRows};
 use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::{Liquid, Surface, Wall};
-use crate::velocity::{FaceFields, MacVelocity, Site, resampled};
+use crate::velocity::{MacVelocity, Site, resampled};
 
 /// A ball of liquid.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,9 +114,7 @@ impl<S: Surface> Liquid<S> {
         images.fill(&mut known);
         images.fill_each(&mut faces);
         if let Some(gain) = &mut self.motion.gain {
-            gain.changed = gain.changed.take().map(|faces| resampled(&rows, self.motion.velocity.rows(), &faces));
-            let gained: FaceFields<f32> = resampled(&rows, self.motion.velocity.rows(), &gain.faces);
-            gain.faces = gained;
+            gain.faces = resampled(&rows, self.motion.velocity.rows(), &gain.faces);
         }
         self.motion.liquid_cells += own.len();
         self.motion.fly_on(&rows);

@@ -4,8 +4,8 @@
 //! Order of a substep: velocity continued past the liquid → surface moved, past solids as they are in the substep's middle; from
 //! here on they are where they are at its end → sources fill, sinks empty → velocity carried
 //! onto the new liquid → gravity, read at the substep's middle → pressure, and viscosity
-//! with it ([`Coupling`]). Liquid that touches nothing moves with the mean of the velocities before and after, and falls by
-//! ½g·t² in substeps of any length; other liquid moves with the velocity before.
+//! with it ([`Coupling`]). The surface moves with a mean velocity of the substep, in which the flow has carried itself along for
+//! half of it; liquid that touches nothing has fallen for half of it, too, and falls by ½g·t² in substeps of any length.
 //!
 //! Splitting velocity from pressure loses spin. [`Splitting::KeepsSpin`] adds what is lost before the velocity is carried.
 //! A disk with a free surface, 19 cells in radius, keeps of its angular momentum over a turn (semi-Lagrangian), and a pool
@@ -35,10 +35,10 @@ mod balls;
 mod continuity;
 mod domain;
 mod exchange;
-mod first;
 mod flight;
 mod force;
 mod fullness;
+mod mean;
 mod motion;
 mod outflow;
 mod part;

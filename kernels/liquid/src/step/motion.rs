@@ -8,7 +8,7 @@ use crate::level_set::PhiView;
 use crate::pressure::LEAST_DEPTH;
 use crate::rows::{Cell, CellRows, Finder, Images};
 use crate::step::domain::{Domain, Obstacle};
-use crate::step::flight::Flight;
+use crate::step::flight::flying;
 use crate::step::outflow::Outflow;
 use crate::step::sources::FlowAccount;
 use crate::step::substep::most_layers;
@@ -20,9 +20,6 @@ use crate::velocity::{ALL_FACES, FaceFields, FaceMask, MacVelocity, Sampler, Sit
 pub(super) struct Gain {
     /// On the rows of the velocity, m/s.
     pub faces: FaceFields<f32>,
-    /// What the velocity of the faces that fly steadily changed by at their places, besides what gravity added, m/s; none where
-    /// nothing flew before.
-    pub changed: Option<FaceFields<f32>>,
     /// The length of that substep, s.
     pub seconds: f64,
 }
@@ -42,8 +39,6 @@ pub struct Motion {
     pub(super) known: Vec<FaceMask>,
     /// The faces of pieces that touch nothing; empty where there are none.
     pub(super) flying: Vec<FaceMask>,
-    /// Whether one of these pieces is large enough to show how it is accelerated.
-    pub(super) flies_shown: bool,
     pub(super) gain: Option<Gain>,
     /// Whether the velocity was set, and there was no substep since.
     pub(super) is_new: bool,
@@ -78,11 +73,10 @@ impl Motion {
                 [0, 1, 2].map(|axis| if open(axis) { value(axis, cell) } else { 0.0 })
             },
         );
-        let (liquid_cells, flight) = (cells.liquid.len(), Flight::of(&cells, &settings.domain, &[]));
-        let (flying, flies_shown) = (flight.faces, flight.is_shown);
+        let (liquid_cells, flying) = (cells.liquid.len(), flying(&cells, &settings.domain));
         let known = cells.known;
         let velocity = MacVelocity::new(cells.rows, faces);
-        Self { velocity, known, flying, flies_shown, is_new: true, liquid_cells, ..Self::default() }
+        Self { velocity, known, flying, is_new: true, liquid_cells, ..Self::default() }
     }
 
     /// The cells that the velocity is stored for.
@@ -135,11 +129,7 @@ impl Motion {
         domain: &Domain,
         own: [f32; 2],
     ) -> Option<CellMaterials> {
-        let materials = self.materials.as_mut()?;
-        let mut of_cells = materials.settle(&cells.rows, &cells.level_set, view, domain, own);
-        cells.images.fill(&mut of_cells.viscosity);
-        cells.images.fill(&mut of_cells.density);
-        Some(of_cells)
+        Some(cells.settle(self.materials.as_mut()?, view, domain, own))
     }
 
     /// The largest component of the velocity, m/s.
@@ -338,6 +328,20 @@ impl LiquidCells {
         let mut level_set = rows.resampled(&self.rows, &self.level_set, self.outside);
         Self::leave_domain(domain, rows, &domain.periods().images(rows), &mut level_set);
         level_set
+    }
+
+    /// What they are made of.
+    pub(super) fn settle(
+        &self,
+        materials: &mut MaterialPoints,
+        view: PhiView<'_>,
+        domain: &Domain,
+        own: [f32; 2],
+    ) -> CellMaterials {
+        let mut of_cells = materials.settle(&self.rows, &self.level_set, view, domain, own);
+        self.images.fill(&mut of_cells.viscosity);
+        self.images.fill(&mut of_cells.density);
+        of_cells
     }
 
     /// Gives images what the faces have that they repeat.

@@ -5,7 +5,7 @@ use numerics::parallel;
 
 use crate::carried::CellMaterials;
 use crate::pressure::{PressureGrid, PressureSolver, Stop, face_densities};
-use crate::rows::CellRows;
+use crate::rows::{CellRows, Finder};
 use crate::stencil::Stencil;
 use crate::step::domain::{Domain, Obstacle};
 use crate::step::exchange::Imposed;
@@ -76,6 +76,27 @@ impl Materials {
         let images = domain.periods().images(rows);
         fields.iter_mut().for_each(|field| images.fill(field));
         fields
+    }
+
+    /// Sets faces to 0 beside cells whose viscosity · Δt ÷ (density · cell²) is above `most`.
+    pub(super) fn clear_thick(&self, cells: &LiquidCells, most: f32, faces: &mut FaceFields<f32>) {
+        let Some([viscosity, density]) = &self.of_cells else {
+            if self.viscosity > f64::from(most) {
+                faces.iter_mut().for_each(|field| field.fill(0.0));
+            }
+            return;
+        };
+        let is_thick = |at: usize| cells.level_set[at] < 0.0 && viscosity[at] > most * density[at];
+        let finder = Finder::new(&cells.rows);
+        for (at, cell) in cells.rows.iter().enumerate() {
+            for axis in 0..3 {
+                let mut below = cell;
+                below[axis] -= 1;
+                if is_thick(at) || finder.find(below).is_some_and(is_thick) {
+                    faces[axis][at] = 0.0;
+                }
+            }
+        }
     }
 
     /// The density at each low face, where it is not the same everywhere.

@@ -7,9 +7,9 @@ use crate::rows::{Cell, Periods};
 use crate::step::continuity::Swelling;
 use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
-use crate::step::first::begin;
-use crate::step::flight::Flight;
+use crate::step::flight::flying;
 use crate::step::force::cut_cells;
+use crate::step::mean::Start;
 use crate::step::motion::{Gain, LiquidCells, Motion, largest_of};
 use crate::step::outflow::outflow;
 use crate::step::passed::passed_over;
@@ -17,7 +17,7 @@ use crate::step::project::{Materials, Projection};
 use crate::step::sources::{LiquidSink, LiquidSource, Span};
 use crate::step::turned;
 use crate::step::{LiquidReport, LiquidSettings, Splitting};
-use crate::velocity::{Advection, Around, FaceFields, MacVelocity, Sampler, Slopes, resampled};
+use crate::velocity::{Advection, Around, FaceFields, MacVelocity, Sampler, Slopes};
 
 /// What is around a liquid.
 #[derive(Clone, Copy)]
@@ -133,7 +133,7 @@ pub(super) const STEEPEST: f32 = 0.25;
 
 /// Layers past the liquid, besides the cells that it moves in a substep, in which velocity goes on as it changes: the faces of
 /// the next substep come from there. Farther out there may be films too thin for a cell, which would fly off.
-const SLOPING_LAYERS: u32 = 2;
+pub(super) const SLOPING_LAYERS: u32 = 2;
 
 /// Cells that liquid is followed over in a substep, at most, so that a substep takes a bounded time: what moves farther ends
 /// anywhere.
@@ -141,7 +141,7 @@ pub(super) const FARTHEST: f32 = 64.0;
 
 /// Cells past the liquid whose velocity is needed where nothing moves farther than `reach` cells: a surface follows the flow
 /// as far as it may come.
-fn layers(reach: f32) -> i32 {
+pub(super) fn layers(reach: f32) -> i32 {
     far_from_surface(reach).ceil() as i32 + 1
 }
 
@@ -164,10 +164,14 @@ pub(super) fn substep(
     let [on_way, solid] = [middle, times[1]].map(|time| around.solid.map(|solid| solid.at(time)));
     let step = (seconds / settings.cell) as f32;
     let gravity = (around.gravity)(middle).map(|g| g * seconds);
-    let first = begin(settings, surface, motion, around, span);
-    let moving = continued(&settings.domain, motion, gravity, on_way, seconds, step);
-    let Continued { velocity, carried, before: flown, way, reach } = moving;
+    let start = Start { settings, surface, around, span };
+    let first = start.begin(motion);
     let periods = settings.domain.periods();
+    let turned = |gain| turned::carried(motion, gain, periods, seconds, [step, STEEPEST / step]);
+    let carried = motion.gain.as_ref().map(turned);
+    let mean = start.mean_velocity(motion, carried.as_ref(), gravity);
+    let Continued { velocity, carried, way, reach } =
+        continued(&settings.domain, motion, (mean.as_ref(), carried), on_way, step);
     let flow = Moving { velocity: &velocity, step, periods, solid: on_way };
     let outflow = outflow(&settings.domain, surface.view(), &flow, on_way, settings.cell_volume());
     let left_domain = outflow.iter().map(|outflow| outflow.volume).sum();
@@ -193,7 +197,6 @@ pub(super) fn substep(
     let mut faces = advection.carry(carried.as_ref().unwrap_or(velocity.faces()), &cells.rows, &cells.moving);
     exchanged.enter_far(velocity.rows(), &cells, &mut faces);
     let stored_cells = velocity.rows().len();
-    let flown = flown.map(|before| resampled(&cells.rows, velocity.rows(), &before));
     drop((velocity, carried));
     Imposed::set(&imposed, &cells.rows, &mut faces, |velocity| velocity);
     cells.images.fill_each(&mut faces);
@@ -218,7 +221,10 @@ pub(super) fn substep(
     cells.images.fill_each(&mut faces);
     report.substeps = 1;
     report.cfl_reached = f64::from(way);
-    first.count(&mut report);
+    report.pressure_iterations += first.pressure_iterations;
+    report.coupled_iterations += first.coupled_iterations;
+    report.viscosity_iterations += first.viscosity_iterations;
+    report.solves_cut_short += first.solves_cut_short;
     report.stored_cells = stored_cells;
     report.liquid_cells = cells.liquid.len();
     report.left_domain = left_domain;
@@ -226,18 +232,12 @@ pub(super) fn substep(
     motion.gain = (settings.splitting == Splitting::KeepsSpin).then(|| {
         let gained =
             |axis: usize| faces[axis].iter().zip(&before[axis]).map(|(after, before)| after - before).collect();
-        Gain { faces: [gained(0), gained(1), gained(2)], changed: None, seconds }
+        Gain { faces: [gained(0), gained(1), gained(2)], seconds }
     });
     motion.liquid_cells = cells.liquid.len();
-    let held_before = if flown.is_some() { motion.held_on(&cells.rows) } else { Vec::new() };
-    let flight = Flight::of(&cells, &settings.domain, &held_before);
-    (motion.flying, motion.flies_shown) = (flight.faces, flight.is_shown);
+    motion.flying = flying(&cells, &settings.domain);
     motion.known = cells.known;
     motion.velocity = MacVelocity::new(cells.rows, faces);
-    if let Some(before) = flown.filter(|_| !motion.flying.is_empty()) {
-        let changed = Some(motion.changed(&before, &flight.steady, gravity));
-        motion.gain = motion.gain.take().map(|gain| Gain { changed, ..gain });
-    }
     report
 }
 
@@ -247,59 +247,42 @@ struct Continued {
     velocity: MacVelocity,
     /// What is carried in its place, where that is another, on its rows.
     carried: Option<FaceFields<f32>>,
-    /// The velocity itself, on the same rows, where something flies that shows how it is accelerated.
-    before: Option<FaceFields<f32>>,
     /// Cells that the fastest liquid moves, and how far it is followed.
     way: f32,
     reach: f32,
 }
 
-/// How the liquid moves in a substep in which gravity adds `gravity`, m/s. `step`: cells moved at 1 m/s.
+/// How the liquid moves in a substep. `mean`, `carried`: its mean velocity, and what is carried, where that is not the velocity at
+/// the start; `step`: cells moved at 1 m/s.
 fn continued(
     domain: &Domain,
     motion: &Motion,
-    gravity: [f64; 3],
+    (mean, carried): (Option<&FaceFields<f32>>, Option<FaceFields<f32>>),
     solid: Option<Obstacle<'_>>,
-    seconds: f64,
     step: f32,
 ) -> Continued {
-    let (steepest, periods) = (STEEPEST / step, domain.periods());
-    let own = motion.velocity.faces();
-    let in_flight = motion.in_flight(gravity, seconds, step);
-    let way = in_flight.as_ref().map_or_else(|| motion.largest_speed(), largest_of) as f32 * step;
+    let (steepest, own) = (STEEPEST / step, motion.velocity.faces());
+    let way = mean.map_or_else(|| motion.largest_speed(), largest_of) as f32 * step;
     let reach = way.min(FARTHEST);
     let rows = motion.rows_past_liquid(domain, layers(reach));
-    let carried = match &motion.gain {
-        Some(gain) => Some(turned::carried(motion, gain, periods, seconds, [step, steepest])),
-        None => in_flight.is_some().then(|| own.clone()),
-    };
+    let carried = carried.or_else(|| mean.map(|_| own.clone()));
     let nearest = Slopes::nearest(steepest);
     // What is carried becomes the liquid's where that comes to. With the nearest differences, which short substeps hardly limit,
     // thin sheets of splashes drove themselves to ten times their energy.
     let of_carried = Slopes { steepest, smooth: true };
     let layers = SLOPING_LAYERS + reach.ceil() as u32;
-    let mut continued = Continued { velocity: MacVelocity::default(), carried: None, before: None, way, reach };
-    let mean = in_flight.as_ref().unwrap_or(own);
-    let velocity = match carried {
-        Some(carried) if motion.flies_shown => {
-            let slopes = [nearest, of_carried, nearest];
-            let fields = [mean, &carried, own];
-            let [velocity, carried, before] = motion.continued(fields, &rows, (slopes, layers), domain, solid);
-            (continued.carried, continued.before) = (Some(carried), Some(before));
-            velocity
-        }
+    let mean = mean.unwrap_or(own);
+    let (velocity, carried) = match carried {
         Some(carried) => {
             let slopes = [nearest, of_carried];
             let [velocity, carried] = motion.continued([mean, &carried], &rows, (slopes, layers), domain, solid);
-            continued.carried = Some(carried);
-            velocity
+            (velocity, Some(carried))
         }
         None => {
             let [velocity] = motion.continued([mean], &rows, ([nearest], layers), domain, solid);
-            velocity
+            (velocity, None)
         }
     };
     let velocity = motion.balanced(&velocity, &rows, domain, solid, steepest);
-    continued.velocity = MacVelocity::new(rows, velocity);
-    continued
+    Continued { velocity: MacVelocity::new(rows, velocity), carried, way, reach }
 }

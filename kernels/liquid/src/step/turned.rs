@@ -68,27 +68,3 @@ pub(super) fn carried(
         },
     )
 }
-
-/// How the velocity changes from place to place along its own direction, (u·∇)u, m/s · m/s a cell, on its rows.
-pub(super) fn along_itself(motion: &Motion, periods: Periods, steepest: f32) -> FaceFields<f32> {
-    let Differences { rows, fields: [velocity] } =
-        &Differences::of(motion, [motion.velocity.faces()], periods, steepest);
-    motion.rows().tabulate_with(
-        || Around::new(rows),
-        |around, cell, at| {
-            let known = motion.known[at];
-            let Some(places) = (if known == 0 { None } else { around.places(cell) }) else { return [0.0; 3] };
-            [0, 1, 2].map(|axis| {
-                if known >> axis & 1 == 0 {
-                    return 0.0;
-                }
-                let slope = |along: usize| places.along(&velocity[axis], along).clamp(-steepest, steepest);
-                let mut sum = motion.velocity.faces()[axis][at] * slope(axis);
-                for other in [(axis + 1) % 3, (axis + 2) % 3] {
-                    sum += places.mean(&velocity[other], other, axis) * slope(other);
-                }
-                sum
-            })
-        },
-    )
-}

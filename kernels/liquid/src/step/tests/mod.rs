@@ -17,6 +17,7 @@ mod sources;
 mod spin;
 mod splash;
 mod spreading;
+mod streams;
 mod tank;
 mod thin;
 mod viscous;

@@ -1,0 +1,182 @@
+//! The velocity that the surface moves with in a substep.
+//!
+//! A substep moves the surface and carries the velocity along before gravity and pressure act. On liquid that something holds
+//! they may act a substep late: waves on a pool neither grow nor fade. What moves with the velocity of the start of a
+//! substep meets on its way the velocity ahead of it, though, not that which comes along, and waves that a stream carries
+//! grow: where they turn by w in a substep on a pool at rest, and the stream carries them by φ of their phase, by
+//! w·sin(φ/4) a substep; a wave of 8 cells on a stream of 2 cells a substep fivefold in 16. So the surface moves with the mean of
+//! the substep, u + ½Δt·∂u/∂t, of what ∂u/∂t would be if nothing but the flow itself acted: of −(u·∇)u what pressure
+//! and viscosity leave. Liquid that touches nothing falls by half of what gravity adds, too: its paths are of second order.
+
+use crate::step::motion::{Gain, Guess, LiquidCells, Motion, largest_of};
+use crate::step::project::{Materials, Projection};
+use crate::step::sources::Span;
+use crate::step::substep::{FARTHEST, SLOPING_LAYERS, STEEPEST, layers};
+use crate::step::{LiquidReport, LiquidSettings, Splitting, Surface, Surroundings};
+use crate::velocity::{Advection, FaceFields, MacVelocity, Slopes, resampled};
+
+/// How much the way in a substep has to change for the mean velocity to be another, in cells.
+const LEAST_BEND: f32 = 1e-3;
+
+/// How much larger than in the solve of a substep errors may be, of that change.
+const COARSER: f64 = 100.0;
+
+/// Viscosity · Δt ÷ (density · cell²) from which on liquid does not carry waves along: they fade. The velocity of thick liquid that
+/// turns does not change, since its viscosity holds what carries it outward.
+const THICK: f32 = 1.0;
+
+/// A liquid at the start of a substep.
+pub(super) struct Start<'a> {
+    pub settings: &'a LiquidSettings,
+    pub surface: &'a dyn Surface,
+    pub around: &'a Surroundings<'a>,
+    pub span: Span,
+}
+
+/// What a velocity changes by in a substep because the flow carries itself along, m/s.
+struct Along {
+    cells: LiquidCells,
+    /// On the rows of the cells.
+    faces: FaceFields<f32>,
+}
+
+impl Start<'_> {
+    fn seconds(&self) -> f64 {
+        self.span.times[1] - self.span.times[0]
+    }
+
+    /// Cells moved at 1 m/s.
+    fn step(&self) -> f32 {
+        (self.seconds() / self.settings.cell) as f32
+    }
+
+    /// The mean velocity of the substep, on the rows of the velocity, in which gravity adds `gained`, m/s; none where it is that
+    /// of the start. `carried`: what is carried in its place, where that is another.
+    pub(super) fn mean_velocity(
+        &self,
+        motion: &Motion,
+        carried: Option<&FaceFields<f32>>,
+        gained: [f64; 3],
+    ) -> Option<FaceFields<f32>> {
+        let falls = !motion.flying.is_empty() && gained != [0.0; 3];
+        let change = self.change(motion, carried);
+        if change.is_none() && !falls {
+            return None;
+        }
+        Some(std::array::from_fn(|axis| {
+            let own = motion.velocity().faces()[axis].iter().enumerate();
+            let fall = (0.5 * gained[axis]) as f32;
+            own.map(|(at, u)| {
+                let flies = falls && motion.flying[at] >> axis & 1 == 1;
+                let bend = change.as_ref().map_or(0.0, |change| 0.5 * change[axis][at]);
+                u + bend + if flies { fall } else { 0.0 }
+            })
+            .collect()
+        }))
+    }
+
+    /// What the velocity changes by, m/s, on its rows, because the flow carries itself along, and pressure holds it together; none
+    /// where that is too little.
+    fn change(&self, motion: &Motion, carried: Option<&FaceFields<f32>>) -> Option<FaceFields<f32>> {
+        let Along { cells, mut faces } = self.along(motion, carried)?;
+        let materials = self.materials(motion, &cells);
+        materials.clear_thick(&cells, THICK, &mut faces);
+        let fastest = largest_of(&faces);
+        if 0.5 * self.step() * fastest as f32 <= LEAST_BEND {
+            return None;
+        }
+        let settings = LiquidSettings { tolerance: COARSER * self.settings.tolerance, ..self.settings.clone() };
+        let coarse = Start { settings: &settings, ..*self };
+        let projection = coarse.projection(&cells, materials, [0.0; 3], fastest);
+        projection.by_pressure(fastest, &mut [], &mut faces, &mut Guess::default());
+        Some(resampled(motion.rows(), &cells.rows, &faces))
+    }
+
+    /// Finds what a substep before would have added to the velocity of liquid that moves, where there was none. Δt·(g −
+    /// (u·∇)u) is what the velocity at a place changes by without pressure; what pressure and viscosity leave of it is
+    /// what it changes by. Solids count as still: their own motion is in the velocity, or an impulse that does not go on.
+    pub(super) fn begin(&self, motion: &mut Motion) -> LiquidReport {
+        if !std::mem::take(&mut motion.is_new) || self.settings.splitting != Splitting::KeepsSpin {
+            return LiquidReport::default();
+        }
+        let Some(Along { cells, faces: along }) = self.along(motion, None) else { return LiquidReport::default() };
+        let seconds = self.seconds();
+        let pulled = (self.around.gravity)(self.span.times[0]).map(|g| g * seconds);
+        let mut faces = along.clone();
+        for axis in 0..3 {
+            let moving = faces[axis].iter_mut().zip(&cells.moving).filter(|(_, mask)| **mask >> axis & 1 == 1);
+            moving.for_each(|(u, _)| *u += pulled[axis] as f32);
+        }
+        let still = faces.each_ref().map(|field| vec![0.0; field.len()]);
+        let materials = self.materials(motion, &cells);
+        let projection = self.projection(&cells, materials, pulled, motion.largest_speed());
+        let report = projection.apply(&still, &mut [], &mut faces, motion);
+        let gained = |axis: usize| faces[axis].iter().zip(&along[axis]).map(|(after, along)| after - along).collect();
+        let gained = [gained(0), gained(1), gained(2)];
+        motion.gain = Some(Gain { faces: resampled(motion.rows(), &cells.rows, &gained), seconds });
+        report
+    }
+
+    /// What the flow changes by as it carries itself along: twice what that changes in half of the substep, with which the velocity is
+    /// carried where waves are as short as their way. None where too little moves, or too far.
+    fn along(&self, motion: &Motion, carried: Option<&FaceFields<f32>>) -> Option<Along> {
+        let Self { settings, surface, around, span } = *self;
+        let (step, domain) = (self.step(), &settings.domain);
+        let way = motion.largest_speed() as f32 * step;
+        // Velocities differ at most by the steepest slope over half of the way.
+        if 0.5 * STEEPEST * way <= LEAST_BEND || way > FARTHEST {
+            return None;
+        }
+        let solid = around.solid.map(|solid| solid.at(span.times[0]));
+        let mut cells = LiquidCells::of(domain, surface, solid.map(|solid| solid.stopped()));
+        cells.fill_images();
+        let rows = motion.rows_past_liquid(domain, layers(0.5 * way));
+        let slopes = ([Slopes::nearest(STEEPEST / step)], SLOPING_LAYERS + way.ceil() as u32);
+        let own = motion.velocity().faces();
+        let half = carried.map(|carried| for_half(own, carried));
+        let [velocity] = motion.continued([half.as_ref().unwrap_or(own)], &rows, slopes, domain, solid);
+        let velocity = MacVelocity::new(rows, velocity);
+        let (bounds, periods, scheme) = (domain.bounds(), domain.periods(), settings.scheme);
+        let half = Advection { velocity: &velocity, bounds, periods, step: 0.5 * step, scheme };
+        let mut faces = half.carry(velocity.faces(), &cells.rows, &cells.moving);
+        let own = resampled(&cells.rows, motion.rows(), own);
+        for axis in 0..3 {
+            for ((u, own), moving) in faces[axis].iter_mut().zip(&own[axis]).zip(&cells.moving) {
+                *u = if moving >> axis & 1 == 1 { 2.0 * (*u - own) } else { 0.0 };
+            }
+        }
+        cells.images.fill_each(&mut faces);
+        Some(Along { cells, faces })
+    }
+
+    fn materials(&self, motion: &Motion, cells: &LiquidCells) -> Materials {
+        let Self { settings, surface, around, span } = *self;
+        let own = [(around.viscosity)(span.times[0]), settings.density];
+        // Taking stock of the points of materials may change them: the substep itself will do so.
+        let mut points = motion.materials.clone();
+        let of_cells = points
+            .as_mut()
+            .map(|points| cells.settle(points, surface.view(), &settings.domain, own.map(|own| own as f32)));
+        Materials::new(own, of_cells, settings, self.seconds())
+    }
+
+    /// Around still solids. `gravity`: what it adds, m/s; `speed`: what errors are measured against, m/s.
+    fn projection<'c>(
+        &'c self,
+        cells: &'c LiquidCells,
+        materials: Materials,
+        gravity: [f64; 3],
+        speed: f64,
+    ) -> Projection<'c> {
+        let solid = self.around.solid.map(|solid| solid.at(self.span.times[0]).stopped());
+        let (settings, seconds) = (self.settings, self.seconds());
+        Projection { settings, cells, materials, solid, cut: &[], imposed: &[], speed, gravity, seconds }
+    }
+}
+
+/// What is carried over half of a substep, of what is carried over all of it: what keeps spin grows with the square of the time.
+fn for_half(own: &FaceFields<f32>, carried: &FaceFields<f32>) -> FaceFields<f32> {
+    std::array::from_fn(|axis| {
+        own[axis].iter().zip(&carried[axis]).map(|(own, carried)| own + 0.25 * (carried - own)).collect()
+    })
+}
