@@ -1,12 +1,14 @@
 //! The velocity that the surface moves with in a substep.
 //!
-//! A substep moves the surface and carries the velocity along before gravity and pressure act. On liquid that something holds
-//! they may act a substep late: waves on a pool neither grow nor fade. What moves with the velocity of the start of a
-//! substep meets on its way the velocity ahead of it, though, not that which comes along, and waves that a stream carries
-//! grow: where they turn by w in a substep on a pool at rest, and the stream carries them by φ of their phase, by
-//! w·sin(φ/4) a substep; a wave of 8 cells on a stream of 2 cells a substep fivefold in 16. So the surface moves with the mean of
-//! the substep, u + ½Δt·∂u/∂t, of what ∂u/∂t would be if nothing but the flow itself acted: of −(u·∇)u what pressure
-//! and viscosity leave. Liquid that touches nothing falls by half of what gravity adds, too: its paths are of second order.
+//! A substep first moves the surface and carries the velocity along; then gravity, pressure and viscosity act. That these act a
+//! substep late does no harm to liquid that something holds: waves on a pool neither grow nor fade. But a surface that moves with
+//! the velocity of the start of the substep meets, on its way, the velocity that was ahead of it, not the one that is carried
+//! along with it. Waves on a stream then grow, by w·sin(φ/4) a substep where a substep is w of their phase on a pool at rest and the
+//! stream carries them by φ of it: a wave of 8 cells on a stream of 2 cells a substep, fivefold in 16 substeps.
+//!
+//! So the surface moves with u + ½Δt·∂u/∂t, where ∂u/∂t is the part of −(u·∇)u that is free of divergence: what the velocity at a
+//! place changes by as the flow carries itself along. Liquid that touches nothing falls by half of what gravity adds, too; it
+//! follows its path to second order.
 
 use crate::step::motion::{Gain, Guess, LiquidCells, Motion, largest_of};
 use crate::step::project::{Materials, Projection};
@@ -21,8 +23,8 @@ const LEAST_BEND: f32 = 1e-3;
 /// How much larger than in the solve of a substep errors may be, of that change.
 const COARSER: f64 = 100.0;
 
-/// Viscosity · Δt ÷ (density · cell²) from which on liquid does not carry waves along: they fade. The velocity of thick liquid that
-/// turns does not change, since its viscosity holds what carries it outward.
+/// Viscosity · Δt ÷ (density · cell²) above which the velocity counts as steady. Waves fade there, and viscosity holds what
+/// would fly outward.
 const THICK: f32 = 1.0;
 
 /// A liquid at the start of a substep.
@@ -31,13 +33,6 @@ pub(super) struct Start<'a> {
     pub surface: &'a dyn Surface,
     pub around: &'a Surroundings<'a>,
     pub span: Span,
-}
-
-/// What a velocity changes by in a substep because the flow carries itself along, m/s.
-struct Along {
-    cells: LiquidCells,
-    /// On the rows of the cells.
-    faces: FaceFields<f32>,
 }
 
 impl Start<'_> {
@@ -75,12 +70,19 @@ impl Start<'_> {
         }))
     }
 
-    /// What the velocity changes by, m/s, on its rows, because the flow carries itself along, and pressure holds it together; none
-    /// where that is too little.
+    /// What the velocity changes by in the substep as the flow carries itself along and pressure holds it together, m/s, on its
+    /// rows; none where that is too little.
     fn change(&self, motion: &Motion, carried: Option<&FaceFields<f32>>) -> Option<FaceFields<f32>> {
-        let Along { cells, mut faces } = self.along(motion, carried)?;
+        if !self.may_change(motion) {
+            return None;
+        }
+        let cells = self.cells();
         let materials = self.materials(motion, &cells);
-        materials.clear_thick(&cells, THICK, &mut faces);
+        if materials.are_thicker(&cells, THICK) {
+            return None;
+        }
+        let mut faces = self.along(motion, carried, &cells);
+        materials.clear_thicker(&cells, THICK, &mut faces);
         let fastest = largest_of(&faces);
         if 0.5 * self.step() * fastest as f32 <= LEAST_BEND {
             return None;
@@ -96,10 +98,12 @@ impl Start<'_> {
     /// (u·∇)u) is what the velocity at a place changes by without pressure; what pressure and viscosity leave of it is
     /// what it changes by. Solids count as still: their own motion is in the velocity, or an impulse that does not go on.
     pub(super) fn begin(&self, motion: &mut Motion) -> LiquidReport {
-        if !std::mem::take(&mut motion.is_new) || self.settings.splitting != Splitting::KeepsSpin {
+        let is_first = std::mem::take(&mut motion.is_new);
+        if !is_first || self.settings.splitting != Splitting::KeepsSpin || !self.may_change(motion) {
             return LiquidReport::default();
         }
-        let Some(Along { cells, faces: along }) = self.along(motion, None) else { return LiquidReport::default() };
+        let cells = self.cells();
+        let along = self.along(motion, None, &cells);
         let seconds = self.seconds();
         let pulled = (self.around.gravity)(self.span.times[0]).map(|g| g * seconds);
         let mut faces = along.clone();
@@ -117,19 +121,26 @@ impl Start<'_> {
         report
     }
 
-    /// What the flow changes by as it carries itself along: twice what that changes in half of the substep, with which the velocity is
-    /// carried where waves are as short as their way. None where too little moves, or too far.
-    fn along(&self, motion: &Motion, carried: Option<&FaceFields<f32>>) -> Option<Along> {
-        let Self { settings, surface, around, span } = *self;
-        let (step, domain) = (self.step(), &settings.domain);
-        let way = motion.largest_speed() as f32 * step;
-        // Velocities differ at most by the steepest slope over half of the way.
-        if 0.5 * STEEPEST * way <= LEAST_BEND || way > FARTHEST {
-            return None;
-        }
-        let solid = around.solid.map(|solid| solid.at(span.times[0]));
-        let mut cells = LiquidCells::of(domain, surface, solid.map(|solid| solid.stopped()));
+    /// Whether what the flow carries along may change it: the velocity differs by the steepest slope at most over half of
+    /// the way. What moves too far is not followed.
+    fn may_change(&self, motion: &Motion) -> bool {
+        let way = motion.largest_speed() as f32 * self.step();
+        0.5 * STEEPEST * way > LEAST_BEND && way <= FARTHEST
+    }
+
+    fn cells(&self) -> LiquidCells {
+        let solid = self.around.solid.map(|solid| solid.at(self.span.times[0]).stopped());
+        let mut cells = LiquidCells::of(&self.settings.domain, self.surface, solid);
         cells.fill_images();
+        cells
+    }
+
+    /// What the velocity changes by in the substep as the flow carries itself along, m/s, on the rows of the cells: twice what it
+    /// does in half of the substep. Differences from cell to cell lag behind waves not much longer than the way.
+    fn along(&self, motion: &Motion, carried: Option<&FaceFields<f32>>, cells: &LiquidCells) -> FaceFields<f32> {
+        let (settings, step, domain) = (self.settings, self.step(), &self.settings.domain);
+        let way = motion.largest_speed() as f32 * step;
+        let solid = self.around.solid.map(|solid| solid.at(self.span.times[0]));
         let rows = motion.rows_past_liquid(domain, layers(0.5 * way));
         let slopes = ([Slopes::nearest(STEEPEST / step)], SLOPING_LAYERS + way.ceil() as u32);
         let own = motion.velocity().faces();
@@ -146,7 +157,7 @@ impl Start<'_> {
             }
         }
         cells.images.fill_each(&mut faces);
-        Some(Along { cells, faces })
+        faces
     }
 
     fn materials(&self, motion: &Motion, cells: &LiquidCells) -> Materials {

@@ -78,14 +78,20 @@ impl Materials {
         fields
     }
 
-    /// Sets faces to 0 beside cells whose viscosity · Δt ÷ (density · cell²) is above `most`.
-    pub(super) fn clear_thick(&self, cells: &LiquidCells, most: f32, faces: &mut FaceFields<f32>) {
-        let Some([viscosity, density]) = &self.of_cells else {
-            if self.viscosity > f64::from(most) {
-                faces.iter_mut().for_each(|field| field.fill(0.0));
+    /// Whether viscosity · Δt ÷ (density · cell²) is above `most` everywhere.
+    pub(super) fn are_thicker(&self, cells: &LiquidCells, most: f32) -> bool {
+        match &self.of_cells {
+            Some([viscosity, density]) => {
+                let mut of_liquid = viscosity.iter().zip(density).zip(&cells.level_set).filter(|(_, phi)| **phi < 0.0);
+                of_liquid.all(|((viscosity, density), _)| *viscosity > most * density)
             }
-            return;
-        };
+            None => self.viscosity > f64::from(most),
+        }
+    }
+
+    /// Sets faces to 0 beside cells where it is, where not all are the same.
+    pub(super) fn clear_thicker(&self, cells: &LiquidCells, most: f32, faces: &mut FaceFields<f32>) {
+        let Some([viscosity, density]) = &self.of_cells else { return };
         let is_thick = |at: usize| cells.level_set[at] < 0.0 && viscosity[at] > most * density[at];
         let finder = Finder::new(&cells.rows);
         for (at, cell) in cells.rows.iter().enumerate() {
