@@ -12,6 +12,12 @@ use std::ops::Range;
 /// Below this the sum of rotations has cancelled, and the guide with the largest weight decides.
 const CANCELLED: f64 = 1e-9;
 
+/// Quaternions q and −q are one rotation. Where the product of a guide's with that of the heaviest guide is below this, they
+/// are more than 240° apart by way of rest, and less than 120° the other way: the guide passed half a turn before the
+/// other, or after it, and counts with the other sign. Not as soon as the other way is the shorter, since guides that lie
+/// down on the two sides of a parting are half a turn apart, and what is between them stands.
+const FAR_APART: f64 = -0.5;
+
 /// Weights sum to 1 up to this.
 const WEIGHT_ROUNDING: f64 = 1e-6;
 
@@ -199,8 +205,20 @@ impl<'a> HairLanes<'a> {
                 share.turns[lane] = self.how.turns.at(places, lane);
             }
         }
-        for share in shares {
-            sum.add_weighted(&LaneTurns::side_by_side(&share.turns), &share.weight, &share.matrix);
+        let mut first = sum;
+        for (rank, share) in shares.iter().enumerate() {
+            let turns = LaneTurns::side_by_side(&share.turns).weighted(&share.weight, &share.matrix);
+            let mut signs = F64x16([1.0; LANES]);
+            if rank == 0 {
+                first = turns;
+            } else {
+                let (dot, heaviest) = (turns.dot(&first), &shares[0].weight);
+                for lane in 0..LANES {
+                    let far = FAR_APART * (heaviest.0[lane] * share.weight.0[lane]);
+                    signs.0[lane] = if dot.0[lane] < far { -1.0 } else { 1.0 };
+                }
+            }
+            sum.add(&turns, &signs);
         }
         for lane in 0..LANES {
             sum.0[0].0[lane] += unguided.0[lane];

@@ -46,18 +46,41 @@ impl LaneTurns {
         [self.0[0].0[lane], self.0[1].0[lane], self.0[2].0[lane], self.0[3].0[lane]]
     }
 
-    /// Adds others times a weight; `matrix` is the weight times a rotation, row by row, which turns their axes.
+    /// Times a weight; `matrix` is the weight times a rotation, row by row, which turns their axes.
     #[inline(always)]
-    pub(super) fn add_weighted(&mut self, other: &Self, weight: &F64x16, matrix: &[F64x16; 9]) {
-        let [w, x, y, z] = &other.0;
+    pub(super) fn weighted(&self, weight: &F64x16, matrix: &[F64x16; 9]) -> Self {
+        let [w, x, y, z] = &self.0;
+        let mut out = Self([F64x16::ZERO; 4]);
         for lane in 0..LANES {
-            self.0[0].0[lane] += weight.0[lane] * w.0[lane];
+            out.0[0].0[lane] = weight.0[lane] * w.0[lane];
         }
         for row in 0..3 {
             let [a, b, c] = [&matrix[3 * row], &matrix[3 * row + 1], &matrix[3 * row + 2]];
             for lane in 0..LANES {
-                let across = a.0[lane] * x.0[lane] + b.0[lane] * y.0[lane] + c.0[lane] * z.0[lane];
-                self.0[row + 1].0[lane] += across;
+                out.0[row + 1].0[lane] = a.0[lane] * x.0[lane] + b.0[lane] * y.0[lane] + c.0[lane] * z.0[lane];
+            }
+        }
+        out
+    }
+
+    /// Products of their quaternions, summed over the four parts.
+    #[inline(always)]
+    pub(super) fn dot(&self, other: &Self) -> F64x16 {
+        let ([w, x, y, z], [a, b, c, d]) = (&self.0, &other.0);
+        let mut dot = F64x16::ZERO;
+        for lane in 0..LANES {
+            let axes = x.0[lane] * b.0[lane] + y.0[lane] * c.0[lane] + z.0[lane] * d.0[lane];
+            dot.0[lane] = w.0[lane] * a.0[lane] + axes;
+        }
+        dot
+    }
+
+    /// Adds others times 1 or −1.
+    #[inline(always)]
+    pub(super) fn add(&mut self, other: &Self, signs: &F64x16) {
+        for part in 0..4 {
+            for lane in 0..LANES {
+                self.0[part].0[lane] += signs.0[lane] * other.0[part].0[lane];
             }
         }
     }
