@@ -218,19 +218,30 @@ pub(crate) fn numbered_path(path: &Path, frame: i64) -> PathBuf {
 
 /// The existing files of the sequence at `path`, in no particular order.
 pub(crate) fn existing_files(path: &Path) -> Vec<PathBuf> {
+    numbered_files(path).map(|(_, path)| path).collect()
+}
+
+/// The first and the last number of the files of the sequence at `path`.
+pub(crate) fn existing_frames(path: &Path) -> Option<(i64, i64)> {
+    let numbers = || numbered_files(path).map(|(frame, _)| frame);
+    numbers().min().zip(numbers().max())
+}
+
+/// The existing files of a sequence with their numbers.
+fn numbered_files(path: &Path) -> impl Iterator<Item = (i64, PathBuf)> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return Vec::new() };
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let before = &name[..name.find('#').unwrap_or(name.len())];
-    let belongs = |found: &str| {
-        let Some(rest) = found.strip_prefix(before) else { return false };
+    let number = move |found: &str| {
+        let rest = found.strip_prefix(before)?;
         let sign = usize::from(rest.starts_with('-'));
         let digits = rest[sign..].bytes().take_while(u8::is_ascii_digit).count();
         // Digits may follow the number in the name.
-        let numbers = (1..=digits).filter_map(|count| rest[..sign + count].parse::<i64>().ok());
-        numbers.into_iter().any(|frame| numbered_path(path, frame).file_name().is_some_and(|name| name == found))
+        let mut numbers = (1..=digits).filter_map(|count| rest[..sign + count].parse::<i64>().ok());
+        numbers.find(|frame| numbered_path(path, *frame).file_name().is_some_and(|name| name == found))
     };
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    entries.filter(|entry| entry.file_name().to_str().is_some_and(belongs)).map(|entry| entry.path()).collect()
+    entries.filter_map(move |entry| Some((number(entry.file_name().to_str()?)?, entry.path())))
 }
 
 /// Whether `path` is a stream that the program inherited, such as `/dev/stdin` or `/dev/fd/3`. Such a path has no
@@ -317,6 +328,8 @@ mod tests {
         assert_eq!(found("a.####1.obj"), ["a.00011.obj"]);
         assert_eq!(found("a.#.obj"), ["a.1.obj", "a.12345.obj"]);
         assert!(found("none.#.obj").is_empty() && existing_files(Path::new("missing/a.#.obj")).is_empty());
+        let frames = |name: &str| existing_frames(&folder.path().join(name));
+        assert_eq!((frames("a.####.obj"), frames("none.#.obj")), (Some((-2, 12345)), None));
     }
 
     #[test]

@@ -82,7 +82,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Deform",
-    4,
+    5,
     "Lets an existing groom follow guide curves, so that only a few hundred guides need to be simulated. Each curve \
      turns as the guides nearest to its root have turned since rest, and keeps its own shape, length and attributes. If \
      `skin` is wired, curves are kept out of it.",
@@ -157,7 +157,7 @@ fn cook(cx: &Cx) -> Result<Outputs> {
         }
         let mut points = deformed.points;
         if let Some(how) = &keep_out_of {
-            kept = keep_out(starts, &mut points, how, &deformed.clear);
+            kept = keep_out(starts, &mut points, how, &deformed.may_meet);
         }
         if moves || kept.kept_out > 0 {
             out.set(P, points)?;
@@ -226,7 +226,7 @@ fn deformed(
     };
     let turned = |name: &str| curves.columns().any(|(owner, column, _)| owner == Owner::Point && **column == *name);
     let with_rotations = [V.name, N.name, ORIENT.name].into_iter().any(turned);
-    Ok(deform_curves(curves.runs().starts(), curves.positions(), &how, with_rotations))
+    Ok(deform_curves(curves.runs().starts(), &how, with_rotations))
 }
 
 /// Rotates vectors and orientations, of CVs and of curves.

@@ -11,7 +11,8 @@ params! { PARAMS:
          `fur.####.obj`.");
     FRAME: Param<i64> = Param::int("frame", 0,
         "The number of the file to read, if `file` names a numbered sequence. Fractions are rounded down. \
-         Between whole frames of the scene points move in straight lines from one file to the next, if it has the same points.")
+         Between whole frames of the scene points move in straight lines from one file to the next, if it has the same points. \
+         A file that is missing is an error, also before the first: `{\"expr\": \"max(frame, 1)\"}` holds file 1 before frame 1.")
         .unit(Unit::Frame).default_current_frame();
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "Positions of CVs given in the graph instead of a file, root to tip, one curve after the other.").unit(Unit::Metres);

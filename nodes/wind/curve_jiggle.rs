@@ -67,7 +67,7 @@ params! { PARAMS:
         .above(0.0).soft(1e-6, 0.1);
     PREROLL: Param<i64> = Param::int("preroll", 0,
         "Frames to simulate before the scene's first frame, if the inputs move there. With 0 the scene starts at \
-         rest.").unit(Unit::Frames).within(0.0, 1e6).soft(0.0, 48.0);
+         rest. Sequences of files need files for these frames, or a `frame` that holds the first: see Mesh_In.").unit(Unit::Frames).within(0.0, 1e6).soft(0.0, 48.0);
     BLEND: Param<Maskable> = Param::maskable("blend", 1.0,
         "How much of the swing is applied: 0 gives the incoming curves, 1 the whole swing. Lengths are kept at any \
          value. While it is 0 nothing swings; when it rises from 0, curves start from rest.").within(0.0, 1.0);

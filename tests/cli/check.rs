@@ -201,6 +201,74 @@ fn a_gap_in_a_sequence_is_found_before_cooking() {
     assert_eq!(bench.names("out").len(), 2, "files of frames that are not requested may be missing");
 }
 
+/// The hint is what to write: with it, frames before the first file and after the last are cooked.
+#[test]
+fn frames_beyond_a_sequence_are_told_how_to_hold_its_ends() {
+    let graph = |frames: &str, frame: &str| {
+        format!(
+            r#"{{"convect": 1, "scene": {{"frames": {frames}}},
+"nodes": {{"a": {{"type": "Mesh_In", "params": {{"file": "in.####.obj"{frame}}}}}}}, "outputs": {{"o": "a"}}}}"#
+        )
+    };
+    let bench = Bench::with_graph("");
+    for frame in [3, 4] {
+        bench.write(&format!("in.000{frame}.obj"), "v 0 0 0\nv 0 1 0\nv 1 0 0\nf 1 2 3\n");
+    }
+    for (frames, frame, expected) in [
+        (
+            "[1, 4]",
+            "",
+            r#"`in.0001.obj` does not exist, at frame 1 and at 1 more frame; the sequence starts at 3; the node's param `"frame": { "expr": "max(frame, 3)" }` holds that file before it"#,
+        ),
+        (
+            "[3, 5]",
+            "",
+            r#"`in.0005.obj` does not exist, at frame 5; the sequence ends at 4; the node's param `"frame": { "expr": "min(frame, 4)" }` holds that file after it"#,
+        ),
+        (
+            "[3, 4]",
+            r#", "frame": {"expr": "2*frame"}"#,
+            "`in.0006.obj` does not exist, at frame 3 and at 1 more frame; the sequence ends at 4; its param `frame`, put into `min(…, 4)`, holds that file after it",
+        ),
+    ] {
+        bench.write("g.json", &graph(frames, frame));
+        let ran = check(&bench);
+        assert_eq!((ran.code, ran.stderr), (Some(1), format!("g.json:2:55: nodes.a.params.file: {expected}\n")));
+    }
+    for (frames, frame) in [
+        ("[-9, 4]", r#", "frame": { "expr": "max(frame, 3)" }"#),
+        ("[3, 5]", r#", "frame": { "expr": "min(frame, 4)" }"#),
+        ("[3, 4]", r#", "frame": { "expr": "min(2*frame, 4)" }"#),
+    ] {
+        bench.write("g.json", &graph(frames, frame));
+        assert_eq!(check(&bench).code, Some(0), "{frame}");
+    }
+}
+
+/// Frames before the scene, which Curve_Jiggle's `preroll` reads, are no frames of the scene: the cook finds what is missing.
+#[test]
+fn a_preroll_before_the_first_file_is_told_how_to_hold_it() {
+    let graph = |frame: &str| {
+        format!(
+            r#"{{"convect": 1, "scene": {{"frames": [1, 2]}},
+"nodes": {{"a": {{"type": "Curve_In", "params": {{"file": "in.####.obj"{frame}}}}},
+"wind": {{"type": "Curve_Wind", "inputs": {{"curves": "a"}}}},
+"j": {{"type": "Curve_Jiggle", "inputs": {{"curves": "wind"}}, "params": {{"preroll": 10}}}}}}, "outputs": {{"o": "j"}}}}"#
+        )
+    };
+    let bench = Bench::with_graph(&graph(""));
+    for frame in [1, 2] {
+        bench.write(&format!("in.000{frame}.obj"), "v 0 0 0\nv 0 1 0\nl 1 2\n");
+    }
+    let ran = bench.run(&["cook", "g.json"]);
+    let expected = "g.json:2:11: `a` (Curve_In) at frame -9: `in.-0009.obj` does not exist; the sequence starts at 1; the node's param \
+                    `\"frame\": { \"expr\": \"max(frame, 1)\" }` holds that file before it (and at 1 more frame)\n\
+                    output `o` was not written\n";
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), expected));
+    bench.write("g.json", &graph(r#", "frame": { "expr": "max(frame, 1)" }"#));
+    bench.done(&["cook", "g.json"]);
+}
+
 #[test]
 fn animated_params_that_leave_their_range_are_found() {
     let bench = Bench::with_graph(CALM_AT_2);

@@ -159,13 +159,16 @@ impl ParamFaults {
             match params.and_then(|params| checks.map_or(Ok(()), |checks| checks(&params)).map(|()| params)) {
                 Err(error) => record(&mut refused, *frame, &|| error.clone()),
                 Ok(params) => {
-                    for (param, path) in resolver.sequence_files(&params) {
-                        if last_found.as_ref() == Some(&path) {
+                    for file in resolver.sequence_files(&params) {
+                        if last_found.as_ref() == Some(&file.path) {
                             continue;
                         }
-                        match std::fs::metadata(&path) {
-                            Ok(_) => last_found = Some(path),
-                            Err(error) => record(&mut missing, *frame, &|| unreadable(&path, &error).of(param)),
+                        match std::fs::metadata(&file.path) {
+                            Ok(_) => last_found = Some(file.path),
+                            Err(error) => record(&mut missing, *frame, &|| {
+                                let error = unreadable(&file.path, &error).of(file.param);
+                                resolver.with_how_to_hold(error, file.sequence, file.frame)
+                            }),
                         }
                     }
                 }

@@ -1,14 +1,24 @@
 //! A node's params at any time: evaluates sources, checks ranges, opens files, and replaces params that are not read by
 //! their defaults.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
-use crate::files::{Files, numbered_path};
+use crate::files::{Files, RELATIVE_PATHS, existing_frames, numbered_path};
 use crate::graph::{Body, Graph, GraphNode};
 use crate::param::{Clock, ParamSpec, Params, ReadLog, Source, Unset, Value};
 use crate::time::Frame;
+
+/// A file of a sequence.
+pub(crate) struct SequenceFile<'s> {
+    /// The param with the sequence, and its path.
+    pub(crate) param: &'static str,
+    pub(crate) sequence: &'s Path,
+    /// The file's number and path.
+    pub(crate) frame: i64,
+    pub(crate) path: PathBuf,
+}
 
 /// Evaluates the params of one node.
 pub(crate) struct Resolver<'g> {
@@ -107,13 +117,38 @@ impl<'g> Resolver<'g> {
         self.sources.iter().any(Source::is_sequence)
     }
 
-    /// The files of sequences that `params` select, with the names of their params.
-    pub(crate) fn sequence_files(&self, params: &Params) -> impl Iterator<Item = (&'static str, PathBuf)> {
+    /// The files of sequences that `params` select.
+    pub(crate) fn sequence_files(&self, params: &Params) -> impl Iterator<Item = SequenceFile<'_>> {
         let frame = self.file_frame(params);
         self.specs.iter().zip(self.sources).filter_map(move |(spec, source)| match source {
-            Source::File { path, numbered: true } => Some((spec.name, numbered_path(path, frame))),
+            Source::File { path: sequence, numbered: true } => {
+                Some(SequenceFile { param: spec.name, sequence, frame, path: numbered_path(sequence, frame) })
+            }
             _ => None,
         })
+    }
+
+    /// The error of a sequence's file, with a hint at how to hold the first or the last file, if it is missing before or
+    /// after them.
+    pub(crate) fn with_how_to_hold(&self, error: Error, sequence: &Path, frame: i64) -> Error {
+        if error.hint.as_deref() != Some(RELATIVE_PATHS) {
+            return error;
+        }
+        let (number, ends, function, side) = match existing_frames(sequence) {
+            Some((first, _)) if frame < first => (first, "starts", "max", "before"),
+            Some((_, last)) if frame > last => (last, "ends", "min", "after"),
+            _ => return error,
+        };
+        let by_default = |index: usize| matches!(self.sources[index], Source::CurrentFrame | Source::CurrentTime);
+        let how = match self.specs.iter().position(|spec| spec.name == "frame") {
+            Some(index) if by_default(index) => {
+                format!(
+                    r#"the node's param `"frame": {{ "expr": "{function}(frame, {number})" }}` holds that file {side} it"#
+                )
+            }
+            _ => format!("its param `frame`, put into `{function}(…, {number})`, holds that file {side} it"),
+        };
+        error.hint(format!("the sequence {ends} at {number}; {how}"))
     }
 
     fn evaluate(&self, frame: f64, past: bool) -> Result<Params> {
@@ -161,7 +196,11 @@ impl<'g> Resolver<'g> {
         for (index, path, numbered) in paths {
             let file = match numbered {
                 false => self.files.open(path)?,
-                true => self.files.open(&numbered_path(path, self.file_frame(&params)))?,
+                true => {
+                    let frame = self.file_frame(&params);
+                    let file = self.files.open(&numbered_path(path, frame));
+                    file.map_err(|error| self.with_how_to_hold(error, path, frame))?
+                }
             };
             let file = match self.specs[index].facts.companions {
                 Some(companions) => {

@@ -270,20 +270,47 @@ impl Boxes {
     /// The box around all lanes.
     #[inline(always)]
     fn bounds(&self) -> (Vec3, Vec3) {
-        let (mut low, mut high) = (self.low, self.high);
-        // Halves, quarters…: a lane after another would be a chain of sixteen.
-        let mut width = LANES / 2;
-        while width > 0 {
-            for axis in 0..3 {
-                for lane in 0..width {
-                    low[axis].0[lane] = least(low[axis].0[lane], low[axis].0[lane + width]);
-                    high[axis].0[lane] = most(high[axis].0[lane], high[axis].0[lane + width]);
-                }
-            }
-            width /= 2;
+        let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
+        for axis in 0..3 {
+            low[axis] = least_of(&self.low[axis]);
+            high[axis] = most_of(&self.high[axis]);
         }
-        (get(&low, 0), get(&high, 0))
+        (low, high)
     }
+}
+
+/// The least of all lanes.
+#[inline(always)]
+fn least_of(lanes: &F32x16) -> f32 {
+    // Halves, quarters…: a lane after another would be a chain of sixteen. Each of a length of its own, as loops of a length that
+    // changes are left scalar.
+    let (mut eight, mut four, mut two) = ([0.0; 8], [0.0; 4], [0.0; 2]);
+    for lane in 0..8 {
+        eight[lane] = least(lanes.0[lane], lanes.0[lane + 8]);
+    }
+    for lane in 0..4 {
+        four[lane] = least(eight[lane], eight[lane + 4]);
+    }
+    for lane in 0..2 {
+        two[lane] = least(four[lane], four[lane + 2]);
+    }
+    least(two[0], two[1])
+}
+
+/// The largest of all lanes, as [`least_of`].
+#[inline(always)]
+fn most_of(lanes: &F32x16) -> f32 {
+    let (mut eight, mut four, mut two) = ([0.0; 8], [0.0; 4], [0.0; 2]);
+    for lane in 0..8 {
+        eight[lane] = most(lanes.0[lane], lanes.0[lane + 8]);
+    }
+    for lane in 0..4 {
+        four[lane] = most(eight[lane], eight[lane + 4]);
+    }
+    for lane in 0..2 {
+        two[lane] = most(four[lane], four[lane + 2]);
+    }
+    most(two[0], two[1])
 }
 
 /// The lesser; `b` where one is NaN.

@@ -18,7 +18,7 @@ use super::kept_half_spaces::{BATCH_CURVES, KeptHalfSpaces};
 use super::segment_turn::{Nearby, gather};
 use super::{Collide, ContactMethod, SkinSurface, collide};
 use crate::attach::{RootPose, attach_curve, relative_stretch};
-use clear_lanes::{ClearBounds, ClearLanes};
+use clear_lanes::{ClearBounds, ClearLanes, segment_bit};
 use numerics::lanes::{F32x16, LANES, set};
 use numerics::masked::Masked;
 use numerics::parallel;
@@ -85,14 +85,15 @@ pub struct KeptOut {
 }
 
 /// Replaces each of the curves `points[starts[i]..starts[i + 1]]` that crosses the skin by one that turned towards it
-/// from rest until it met the skin. Those that are known to be clear (see [`KeepOut::prepare`]) are not tested; an empty
-/// slice if that has not been found out.
+/// from rest until it met the skin. Of each curve `may_meet` has a bit for each segment that may do so, the last for all
+/// further ones too; the others are known to be clear (see [`KeepOut::prepare`]) and not tested. Empty if that has not been
+/// found out.
 ///
 /// # Panics
 /// If `starts` does not run up to the number of points, of `points` and of the rest shapes, or if there are more curves than
-/// in [`Clearance::of`] or `clear`.
-pub fn keep_out(starts: &[u32], points: &mut [Vec3], how: &KeepOut<'_>, clear: &[bool]) -> KeptOut {
-    keep_out_on(Path::chosen(), starts, points, how, clear)
+/// in [`Clearance::of`] or `may_meet`.
+pub fn keep_out(starts: &[u32], points: &mut [Vec3], how: &KeepOut<'_>, may_meet: &[u32]) -> KeptOut {
+    keep_out_on(Path::chosen(), starts, points, how, may_meet)
 }
 
 /// [`keep_out`] on a given SIMD path.
@@ -101,21 +102,21 @@ pub(super) fn keep_out_on(
     starts: &[u32],
     points: &mut [Vec3],
     how: &KeepOut<'_>,
-    clear: &[bool],
+    may_meet: &[u32],
 ) -> KeptOut {
     let curves = starts.len().saturating_sub(1);
     let half_spaces = &how.clearance.half_spaces;
     let tasks = (0..curves).step_by(TASK_CURVES).map(|first| first..curves.min(first + TASK_CURVES));
     let entered = parallel::map(tasks, |_, curves| {
         let mut found = Vec::new();
-        let clear = match clear {
+        let may_meet = match may_meet {
             [] => {
-                clear_curves(path, curves.clone(), starts, points, how, &mut found);
+                find_segments(path, curves.clone(), starts, points, how, &mut found);
                 &found[..]
             }
             known => &known[curves.clone()],
         };
-        entering(path, curves, starts, points, how, clear)
+        entering(path, curves, starts, points, how, may_meet)
     });
     let entered = parallel::concat(entered);
     let mut kept =
@@ -311,22 +312,28 @@ fn look_up_task(curves: Range<usize>, starts: &[u32], how: &KeepOut<'_>, out: &m
 }
 
 kernel! { avx512
-    /// Adds to `clear` whether each of `curves` stays in its half-space.
-    fn clear_curves(
+    /// Adds to `may_meet` the segments of each of `curves` that leave its half-space, as a bit each.
+    fn find_segments(
         curves: Range<usize>,
         starts: &[u32],
         points: &[Vec3],
         how: &KeepOut<'_>,
-        clear: &mut Vec<bool>,
-    ) = clear_curves_task;
+        may_meet: &mut Vec<u32>,
+    ) = find_segments_task;
 }
 
 #[inline(always)]
-fn clear_curves_task(curves: Range<usize>, starts: &[u32], points: &[Vec3], how: &KeepOut<'_>, clear: &mut Vec<bool>) {
+fn find_segments_task(
+    curves: Range<usize>,
+    starts: &[u32],
+    points: &[Vec3],
+    how: &KeepOut<'_>,
+    may_meet: &mut Vec<u32>,
+) {
     for first in curves.clone().step_by(LANES) {
         let hairs = LANES.min(curves.end - first);
         let Some(mut lanes) = how.lanes(first) else {
-            clear.resize(clear.len() + hairs, false);
+            may_meet.resize(may_meet.len() + hairs, u32::MAX);
             continue;
         };
         let mut cvs = [0; LANES];
@@ -350,19 +357,19 @@ fn clear_curves_task(curves: Range<usize>, starts: &[u32], points: &[Vec3], how:
         }
         let mask = lanes.mask();
         for lane in 0..hairs {
-            clear.push(mask >> lane & 1 == 1 && cvs[lane] >= 2);
+            may_meet.push(if mask >> lane & 1 == 1 { 0 } else { lanes.segments_below(lane, cvs[lane]) });
         }
     }
 }
 
 kernel! { avx512
-    /// Those of `curves` that cross the skin, and whether they do at rest; those that are `clear` do not.
+    /// Those of `curves` that cross the skin, and whether they do at rest; segments without a bit do not.
     fn entering(
         curves: Range<usize>,
         starts: &[u32],
         points: &[Vec3],
         how: &KeepOut<'_>,
-        clear: &[bool],
+        may_meet: &[u32],
     ) -> Vec<Entering> = entering_task;
 }
 
@@ -372,29 +379,31 @@ fn entering_task(
     starts: &[u32],
     points: &[Vec3],
     how: &KeepOut<'_>,
-    clear: &[bool],
+    may_meet: &[u32],
 ) -> Vec<Entering> {
     let (mut entered, mut rest) = (Vec::new(), Vec::new());
     let mut nearby = Nearby::default();
-    for (curve, is_clear) in curves.zip(clear) {
+    for (curve, may_meet) in curves.zip(may_meet) {
         let cvs = starts[curve] as usize..starts[curve + 1] as usize;
         let now = &points[cvs.clone()];
-        if *is_clear || now.len() < 2 || !is_finite(now) {
+        if *may_meet == 0 || now.len() < 2 || !is_finite(now) {
             continue;
         }
         let root = how.root(curve, cvs.start);
         let lifted = how.is_lifted(now[0], &root);
         let untested = how.untested(lifted);
-        let known = how.clearance.half_spaces.get(curve).zip(Some(root));
-        rest.resize(now.len(), [0.0; 3]);
-        how.write_rest(curve, cvs, now[0], &mut rest);
-        let (outside, start, tree) = (tested_start(&rest, untested), tested_start(now, untested), how.skin.tree);
-        if crosses(now, [outside, start], tree, known.as_ref(), &mut nearby) {
+        let mut first_rest = [[0.0; 3]; 2];
+        how.write_rest(curve, cvs.start..cvs.start + 2, now[0], &mut first_rest);
+        let (outside, start, tree) = (tested_start(&first_rest, untested), tested_start(now, untested), how.skin.tree);
+        if crosses(now, [outside, start], tree, &Tested::Segments(*may_meet), &mut nearby) {
             let mut one = Entering { curve: curve as u32, at_rest: false, lifted, shift: DVec3::zeros() };
-            if crosses(&rest, [outside; 2], tree, known.as_ref(), &mut nearby) {
+            let tested = Tested::Outside(how.clearance.half_spaces.get(curve).zip(Some(root)));
+            rest.resize(now.len(), [0.0; 3]);
+            how.write_rest(curve, cvs, now[0], &mut rest);
+            if crosses(&rest, [outside; 2], tree, &tested, &mut nearby) {
                 (one.lifted, one.shift) = (true, how.skin.lift(now[0], how.gap).shift);
                 shifted(&mut rest, &one.shift);
-                one.at_rest = crosses(&rest, [Some(rest[0]); 2], tree, known.as_ref(), &mut nearby);
+                one.at_rest = crosses(&rest, [Some(rest[0]); 2], tree, &tested, &mut nearby);
             }
             entered.push(one);
         }
@@ -435,14 +444,33 @@ fn widen(low: &mut Vec3, high: &mut Vec3, point: Vec3) {
     }
 }
 
+/// The segments of a curve that are tested.
+enum Tested<'a> {
+    /// Those with a bit; see [`keep_out`].
+    Segments(u32),
+    /// Those that are not in the half-space of the curve, which has this root.
+    Outside(Option<(&'a HalfSpace, DVec3)>),
+}
+
+impl Tested<'_> {
+    /// Whether segment `k`, of which the part from `a` to `b` counts, is none of them.
+    #[inline(always)]
+    fn leaves_out(&self, k: usize, a: Vec3, b: Vec3) -> bool {
+        match self {
+            Self::Segments(bits) => bits >> segment_bit(k) & 1 == 0,
+            Self::Outside(known) => known.as_ref().is_some_and(|known| is_free(known, a, b)),
+        }
+    }
+}
+
 /// Whether a curve, whose tested part starts at `start`, crosses the skin. So does one whose start has passed through it
-/// since rest, when it was at `outside`. Segments in the half-space of the curve need no query.
+/// since rest, when it was at `outside`.
 #[inline(always)]
 fn crosses<'t>(
     cvs: &[Vec3],
     [outside, start]: [Option<Vec3>; 2],
     tree: &'t TriangleTree,
-    known: Option<&(&HalfSpace, DVec3)>,
+    which: &Tested<'_>,
     nearby: &mut Nearby<'t>,
 ) -> bool {
     let last = cvs.len() - 1;
@@ -452,9 +480,7 @@ fn crosses<'t>(
         let mut tested = [false; GATHERED_SEGMENTS];
         for k in first..end {
             let Some(from) = (if k == 0 { start } else { Some(cvs[k]) }) else { continue };
-            if let Some(known) = known
-                && is_free(known, from, cvs[k + 1])
-            {
+            if which.leaves_out(k, from, cvs[k + 1]) {
                 continue;
             }
             tested[k - first] = true;

@@ -3,13 +3,13 @@
 
 use super::turns::{GuideSegments, NO_GUIDE, segment_middles};
 use crate::guides::GuideWeights;
-use numerics::lanes::{F32x16, F64x16, LANES};
+use numerics::lanes::{F32x16, F64x16, LANES, Lanes, set};
 use numerics::parallel;
 
-/// The guides of hairs, and where along them the hairs' segments are.
+/// The guides of hairs, where along them the hairs' segments are, and the hairs at rest.
 ///
-/// 24 bytes for each guide of a hair and 12 for each guide of a segment; hairs with fewer segments than the longest of the
-/// sixteen beside them take as much as that one.
+/// 24 bytes for each guide of a hair, 12 for each guide of a segment, and 12 for each CV; hairs with fewer than the longest
+/// of the sixteen beside them take as much as that one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HairGuides {
     per_hair: usize,
@@ -19,6 +19,17 @@ pub struct HairGuides {
     places: Vec<LanePlaces>,
     /// The first of each sixteen hairs' places, and their number.
     firsts: Vec<usize>,
+    /// Of each sixteen hairs the CVs at rest, metres; hairs with fewer repeat their last.
+    rest: Vec<Lanes<3>>,
+    /// The first of each sixteen hairs' CVs, and their number.
+    rest_firsts: Vec<usize>,
+}
+
+/// What is known of sixteen hairs.
+pub(super) struct KnownLanes<'a> {
+    pub(super) guides: &'a [LaneGuides],
+    pub(super) places: &'a [LanePlaces],
+    pub(super) rest: &'a [Lanes<3>],
 }
 
 /// One guide of each of sixteen hairs.
@@ -61,6 +72,7 @@ impl HairGuides {
                     (starts[hair] as usize - hair, (starts[hair + 1] as usize).max(starts[hair] as usize + 1));
                 &middles[from..to - 1 - hair]
             };
+            let cvs = lanes_of(hairs.clone().map(|hair| &rest[starts[hair] as usize..starts[hair + 1] as usize]));
             let mut guides = vec![LaneGuides::NONE; per_hair];
             let most = hairs.clone().map(|hair| of_hair(hair).len()).max().unwrap_or(0);
             let mut places = vec![LanePlaces::NONE; most * per_hair];
@@ -80,26 +92,47 @@ impl HairGuides {
                     }
                 }
             }
-            (guides, places)
+            (guides, places, cvs)
         });
-        let mut all = Self { per_hair, guides: Vec::new(), places: Vec::new(), firsts: vec![0] };
+        let (guides, places, cvs) = (Vec::new(), Vec::new(), Vec::new());
+        let mut all = Self { per_hair, guides, places, firsts: vec![0], rest: cvs, rest_firsts: vec![0] };
         all.guides.reserve_exact(parts.len() * per_hair);
-        all.places.reserve_exact(parts.iter().map(|(_, places)| places.len()).sum());
-        for (guides, places) in parts {
+        all.places.reserve_exact(parts.iter().map(|(_, places, _)| places.len()).sum());
+        all.rest.reserve_exact(parts.iter().map(|(.., cvs)| cvs.len()).sum());
+        for (guides, places, cvs) in parts {
             all.guides.extend(guides);
             all.places.extend(places);
             all.firsts.push(all.places.len());
+            all.rest.extend(cvs);
+            all.rest_firsts.push(all.rest.len());
         }
         all
     }
 
-    /// Of the hairs from `first`, a multiple of sixteen, on: the guides, and the places of all segments on them.
+    /// The hairs from `first`, a multiple of sixteen, on.
     #[inline(always)]
-    pub(super) fn lanes(&self, first: usize) -> (&[LaneGuides], &[LanePlaces]) {
+    pub(super) fn lanes(&self, first: usize) -> KnownLanes<'_> {
         let sixteen = first / LANES;
-        let guides = &self.guides[sixteen * self.per_hair..(sixteen + 1) * self.per_hair];
-        (guides, &self.places[self.firsts[sixteen]..self.firsts[sixteen + 1]])
+        KnownLanes {
+            guides: &self.guides[sixteen * self.per_hair..(sixteen + 1) * self.per_hair],
+            places: &self.places[self.firsts[sixteen]..self.firsts[sixteen + 1]],
+            rest: &self.rest[self.rest_firsts[sixteen]..self.rest_firsts[sixteen + 1]],
+        }
     }
+}
+
+/// Up to sixteen curves side by side; those with fewer CVs repeat their last.
+fn lanes_of<'a>(curves: impl Iterator<Item = &'a [[f32; 3]]> + Clone) -> Vec<Lanes<3>> {
+    let most = curves.clone().map(<[_]>::len).max().unwrap_or(0);
+    let mut lanes = vec![[F32x16::splat(0.0); 3]; most];
+    for (lane, curve) in curves.enumerate() {
+        for (k, cv) in lanes.iter_mut().enumerate() {
+            if let Some(point) = curve.get(k).or(curve.last()) {
+                set(cv, lane, *point);
+            }
+        }
+    }
+    lanes
 }
 
 impl LaneGuides {

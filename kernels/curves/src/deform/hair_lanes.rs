@@ -1,16 +1,25 @@
 //! Sixteen hairs side by side, turned as their guides are.
 
-use super::hair_guides::{LaneGuides, LanePlaces};
+use super::hair_guides::{KnownLanes, LaneGuides, LanePlaces};
 use super::hairs::{CurveDeform, DeformedCurves};
 use super::turns::{LaneTurns, NO_GUIDE, Turn};
 use crate::attach::RootPose;
 use nalgebra::{Quaternion, Unit};
-use numerics::lanes::{F32x16, F64x16, LANES, Lanes, get, set};
+use numerics::lanes::{F32x16, F64x16, LANES, Lanes, get};
 use numerics::vector::{DQuat, DVec3, Vec3};
 use std::ops::Range;
 
 /// Below this the sum of rotations has cancelled, and the guide with the largest weight decides.
 const CANCELLED: f64 = 1e-9;
+
+/// Quaternions q and −q are one rotation. Where the product of a guide's with that of the heaviest guide is below this, they
+/// are more than 240° apart by way of rest, and less than 120° the other way: the guide passed half a turn before the
+/// other, or after it, and counts with the other sign. Not as soon as the other way is the shorter, since guides that lie
+/// down on the two sides of a parting are half a turn apart, and what is between them stands.
+const FAR_APART: f64 = -0.5;
+
+/// No rotations with at least this w, of 120° and a little less, are [`FAR_APART`].
+const NEVER_FAR_APART: f64 = 0.5 + 1e-6;
 
 /// Weights sum to 1 up to this.
 const WEIGHT_ROUNDING: f64 = 1e-6;
@@ -29,22 +38,22 @@ impl Share {
     const NONE: Self = Self { weight: F64x16::ZERO, matrix: [F64x16::ZERO; 9], turns: [[0.0; 4]; LANES] };
 }
 
-/// What is known of sixteen hairs while they are turned. Hairs are read and written one by one, each along its CVs: across
+/// What is known of sixteen hairs while they are turned. Hairs are written one by one, each along its CVs: across
 /// them, sixteen at a time, each number would need its own index.
 #[derive(Default)]
 pub(super) struct Scratch {
     shares: Vec<Share>,
-    /// CVs at rest and displaced, as they are written; hairs with fewer repeat their last.
-    rest: Vec<Lanes<3>>,
+    /// CVs displaced, as they are written; hairs with fewer repeat their last.
     now: Vec<Lanes<3>>,
 }
 
 /// Up to sixteen successive hairs.
 pub(super) struct HairLanes<'a> {
     how: &'a CurveDeform<'a>,
-    rest: &'a [Vec3],
     guides: &'a [LaneGuides],
     places: &'a [LanePlaces],
+    /// CVs at rest; hairs with fewer repeat their last.
+    rest: &'a [Lanes<3>],
     /// A multiple of sixteen.
     first: usize,
     /// Number of hairs.
@@ -55,24 +64,24 @@ pub(super) struct HairLanes<'a> {
 }
 
 impl<'a> HairLanes<'a> {
-    /// The hairs `curves`, sixteen at most, of `rest[starts[i]..starts[i + 1]]`.
+    /// The hairs `curves`, sixteen at most, with the CVs `starts[i]..starts[i + 1]`.
     #[inline(always)]
-    pub(super) fn of(curves: Range<usize>, starts: &[u32], rest: &'a [Vec3], how: &'a CurveDeform<'a>) -> Self {
+    pub(super) fn of(curves: Range<usize>, starts: &[u32], how: &'a CurveDeform<'a>) -> Self {
         let (mut root, mut cvs) = ([0; LANES], [0; LANES]);
         for lane in 0..curves.len() {
             let (from, to) = (starts[curves.start + lane] as usize, starts[curves.start + lane + 1] as usize);
             (root[lane], cvs[lane]) = (from, to - from);
         }
-        let (guides, places) = how.guides.lanes(curves.start);
-        Self { how, rest, guides, places, first: curves.start, hairs: curves.len(), root, cvs }
+        let KnownLanes { guides, places, rest } = how.guides.lanes(curves.start);
+        Self { how, guides, places, rest, first: curves.start, hairs: curves.len(), root, cvs }
     }
 
     /// Writes the hairs to `out`, whose first row is `base` of all, and the rotation of each CV to those `done` unless there
-    /// are none; adds the largest stretch, and which hairs are clear if that is wanted.
+    /// are none; adds the largest stretch, and which segments may meet something if that is wanted.
     #[inline(always)]
     pub(super) fn follow(&self, scratch: &mut Scratch, base: usize, out: &mut [Vec3], done: &mut DeformedCurves) {
-        self.read(scratch);
-        let mut displacement = self.gather(&mut scratch.shares);
+        scratch.now.resize(self.rest.len(), [F32x16::splat(0.0); 3]);
+        let (mut displacement, least_w) = self.gather(&mut scratch.shares);
         let part = self.blends(0);
         for axis in 0..3 {
             for lane in 0..LANES {
@@ -83,11 +92,11 @@ impl<'a> HairLanes<'a> {
         if let Some(poses) = self.how.poses {
             still = Some(self.place_roots(poses, &mut displacement));
         }
-        let unguided = unguided(&scratch.shares);
+        let (unguided, may_be_far_apart) = (unguided(&scratch.shares), least_w < NEVER_FAR_APART);
         let (mut whole, mut largest) = (F64x16::ZERO, F64x16::ZERO);
-        let Scratch { shares, rest: cvs, now: moved } = scratch;
+        let Scratch { shares, now: moved } = scratch;
         let (mut rest, mut now) = ([F64x16::ZERO; 3], [F32x16::splat(0.0); 3]);
-        for (k, (cv, out)) in cvs.iter().zip(&mut *moved).enumerate() {
+        for (k, (cv, out)) in self.rest.iter().zip(&mut *moved).enumerate() {
             let (from, before) = (rest, now);
             rest = widened(cv);
             let Some(segment) = k.checked_sub(1) else {
@@ -95,7 +104,7 @@ impl<'a> HairLanes<'a> {
                 *out = now;
                 continue;
             };
-            let mut turns = self.turns(shares, segment, &unguided);
+            let mut turns = self.turns(shares, segment, &unguided, may_be_far_apart);
             self.take_part(&mut turns, segment);
             let along = difference(&rest, &from);
             let mut turned = turns.rotate(&along);
@@ -117,20 +126,25 @@ impl<'a> HairLanes<'a> {
                 largest.0[lane] = if error > largest.0[lane] { error } else { largest.0[lane] };
             }
         }
+        // Divided side by side: also by 0, of which nothing is kept.
+        let mut stretch = F64x16::ZERO;
         for lane in 0..LANES {
-            let share = if whole.0[lane] > 0.0 { largest.0[lane] / whole.0[lane] } else { 0.0 };
+            let share = largest.0[lane] / whole.0[lane];
+            stretch.0[lane] = if whole.0[lane] > 0.0 { share } else { 0.0 };
+        }
+        for share in stretch.0 {
             done.length_error = if share > done.length_error { share } else { done.length_error };
         }
         self.write(scratch, base, out);
-        self.add_clear(scratch, done);
+        self.add_segments(scratch, done);
     }
 
-    /// Adds which hairs are clear of what they are kept out of, if that is wanted.
+    /// Adds which segments may meet what they are kept out of, if that is wanted.
     #[inline(always)]
-    fn add_clear(&self, scratch: &Scratch, done: &mut DeformedCurves) {
+    fn add_segments(&self, scratch: &Scratch, done: &mut DeformedCurves) {
         let Some(keep_out) = self.how.keep_out else { return };
         let Some(mut clear) = keep_out.lanes(self.first) else {
-            done.clear.resize(done.clear.len() + self.hairs, false);
+            done.may_meet.resize(done.may_meet.len() + self.hairs, u32::MAX);
             return;
         };
         for (k, ends) in scratch.now.windows(2).enumerate() {
@@ -138,23 +152,25 @@ impl<'a> HairLanes<'a> {
         }
         let mask = clear.mask();
         for lane in 0..self.hairs {
-            done.clear.push(mask >> lane & 1 == 1 && self.cvs[lane] >= 2);
+            done.may_meet.push(if mask >> lane & 1 == 1 { 0 } else { clear.segments_below(lane, self.cvs[lane]) });
         }
     }
 
-    /// Finds what the hairs' guides contribute; returns the mean offset of their roots, in the frames of the hairs.
+    /// Finds what the hairs' guides contribute; returns the mean offset of their roots, in the frames of the hairs, and the
+    /// least w of all their rotations.
     #[inline(always)]
-    fn gather(&self, shares: &mut Vec<Share>) -> [F64x16; 3] {
-        let mut offset = [F64x16::ZERO; 3];
+    fn gather(&self, shares: &mut Vec<Share>) -> ([F64x16; 3], f64) {
+        let (mut offset, mut least_w) = ([F64x16::ZERO; 3], 1.0);
         shares.resize(self.guides.len(), Share::NONE);
         for (guide, share) in self.guides.iter().zip(shares) {
             share.set(guide);
             let mut arm = [F64x16::ZERO; 3];
             for lane in 0..LANES {
-                let moved = self.how.turns.offset(guide.guide[lane]);
+                let guide = self.how.turns.of_guide(guide.guide[lane]);
                 for axis in 0..3 {
-                    arm[axis].0[lane] = moved[axis];
+                    arm[axis].0[lane] = guide.offset[axis];
                 }
+                least_w = if guide.least_w < least_w { guide.least_w } else { least_w };
             }
             for row in 0..3 {
                 let [a, b, c] = [&share.matrix[3 * row], &share.matrix[3 * row + 1], &share.matrix[3 * row + 2]];
@@ -164,7 +180,7 @@ impl<'a> HairLanes<'a> {
                 }
             }
         }
-        offset
+        (offset, least_w)
     }
 
     /// Carries the displacements of roots along with their poses; returns the rotations of these.
@@ -188,9 +204,10 @@ impl<'a> HairLanes<'a> {
         still
     }
 
-    /// The mean rotations of the hairs' guides at the middle of a segment; `unguided` is the weight that no guide holds.
+    /// The mean rotations of the hairs' guides at the middle of a segment; `unguided` is the weight that no guide holds,
+    /// `may_be_far_apart` whether any of these may be [`FAR_APART`].
     #[inline(always)]
-    fn turns(&self, shares: &mut [Share], segment: usize, unguided: &F64x16) -> LaneTurns {
+    fn turns(&self, shares: &mut [Share], segment: usize, unguided: &F64x16, may_be_far_apart: bool) -> LaneTurns {
         let mut sum = LaneTurns([F64x16::ZERO; 4]);
         let places = &self.places[segment * shares.len()..];
         // All are looked up before the first is read: what is read at once, across what was just written, is waited for.
@@ -199,8 +216,12 @@ impl<'a> HairLanes<'a> {
                 share.turns[lane] = self.how.turns.at(places, lane);
             }
         }
-        for share in shares {
-            sum.add_weighted(&LaneTurns::side_by_side(&share.turns), &share.weight, &share.matrix);
+        if may_be_far_apart {
+            add_aligned(&mut sum, shares);
+        } else {
+            for share in shares {
+                sum.add_weighted(&LaneTurns::side_by_side(&share.turns), &share.weight, &share.matrix);
+            }
         }
         for lane in 0..LANES {
             sum.0[0].0[lane] += unguided.0[lane];
@@ -279,30 +300,6 @@ impl<'a> HairLanes<'a> {
         blends
     }
 
-    /// Reads the CVs at rest.
-    #[inline(always)]
-    fn read(&self, scratch: &mut Scratch) {
-        let mut most = 0;
-        for cvs in self.cvs {
-            most = if cvs > most { cvs } else { most };
-        }
-        let Scratch { rest, now, .. } = scratch;
-        now.resize(most, [F32x16::splat(0.0); 3]);
-        rest.resize(most, [F32x16::splat(0.0); 3]);
-        for lane in 0..LANES {
-            let points = &self.rest[self.root[lane]..self.root[lane] + self.cvs[lane]];
-            let (mine, others) = rest.split_at_mut(points.len());
-            let mut last = [0.0; 3];
-            for (cv, point) in mine.iter_mut().zip(points) {
-                last = *point;
-                set(cv, lane, last);
-            }
-            for cv in others {
-                set(cv, lane, last);
-            }
-        }
-    }
-
     /// Writes the displaced CVs.
     #[inline(always)]
     fn write(&self, scratch: &Scratch, base: usize, out: &mut [Vec3]) {
@@ -359,6 +356,27 @@ impl Share {
             matrix[6].0[lane] = twice * (x * z - w * y) * weight;
             matrix[7].0[lane] = twice * (y * z + w * x) * weight;
             matrix[8].0[lane] = (1.0 - twice * (x * x + y * y)) * weight;
+        }
+    }
+}
+
+/// Adds the rotations of guides, those that are [`FAR_APART`] from the heaviest guide's with the other sign.
+#[inline(always)]
+fn add_aligned(sum: &mut LaneTurns, shares: &[Share]) {
+    let mut heaviest = *sum;
+    for (rank, share) in shares.iter().enumerate() {
+        let mut turns = LaneTurns([F64x16::ZERO; 4]);
+        turns.add_weighted(&LaneTurns::side_by_side(&share.turns), &share.weight, &share.matrix);
+        if rank == 0 {
+            heaviest = turns;
+        }
+        let dot = turns.dot(&heaviest);
+        for lane in 0..LANES {
+            let far = FAR_APART * (shares[0].weight.0[lane] * share.weight.0[lane]);
+            let sign = if dot.0[lane] < far { -1.0 } else { 1.0 };
+            for part in 0..4 {
+                sum.0[part].0[lane] += sign * turns.0[part].0[lane];
+            }
         }
     }
 }

@@ -35,37 +35,38 @@ pub struct DeformedCurves {
     pub points: Vec<Vec3>,
     /// The rotation of each CV, that of the segment after it; empty if not asked for.
     pub rotations: Vec<DQuat>,
-    /// Whether each curve is known to meet nothing of what it is to be kept out of; empty if that is not given.
-    pub clear: Vec<bool>,
+    /// Of each curve the segments that may meet what it is to be kept out of, as [`crate::collide::keep_out()`] takes them;
+    /// empty if that is not given.
+    pub may_meet: Vec<u32>,
     /// Largest change of a segment's length ÷ its curve's length, measured on the results.
     pub length_error: f64,
 }
 
-/// Deforms curves `rest[starts[i]..starts[i + 1]]`, with the rotation of each CV if `with_rotations`.
+/// Deforms the curves of `how.guides`, whose CVs are the rows `starts[i]..starts[i + 1]`, with the rotation of each CV if
+/// `with_rotations`.
 ///
 /// # Panics
-/// If `starts` does not run from 0 to the number of points, or a slice of `how` is shorter than its rows.
-pub fn deform_curves(starts: &[u32], rest: &[Vec3], how: &CurveDeform<'_>, with_rotations: bool) -> DeformedCurves {
-    deform_curves_on(Path::chosen(), starts, rest, how, with_rotations)
+/// If `starts` is that of other curves, or a slice of `how` is shorter than its rows.
+pub fn deform_curves(starts: &[u32], how: &CurveDeform<'_>, with_rotations: bool) -> DeformedCurves {
+    deform_curves_on(Path::chosen(), starts, how, with_rotations)
 }
 
 /// [`deform_curves`] on a given SIMD path.
 pub(super) fn deform_curves_on(
     path: Path,
     starts: &[u32],
-    rest: &[Vec3],
     how: &CurveDeform<'_>,
     with_rotations: bool,
 ) -> DeformedCurves {
-    let mut points = vec![[0.0; 3]; rest.len()];
+    let mut points = vec![[0.0; 3]; starts.last().map_or(0, |end| *end as usize)];
     let done = parallel::map(tasks(starts, &mut points), |_, (curves, out)| {
-        follow(path, curves, starts, rest, how, out, with_rotations)
+        follow(path, curves, starts, how, out, with_rotations)
     });
     let mut all = DeformedCurves::default();
     for mut one in done {
         all.length_error = all.length_error.max(one.length_error);
         all.rotations.append(&mut one.rotations);
-        all.clear.append(&mut one.clear);
+        all.may_meet.append(&mut one.may_meet);
     }
     DeformedCurves { points, ..all }
 }
@@ -94,7 +95,6 @@ kernel! { avx512
     fn follow(
         curves: Range<usize>,
         starts: &[u32],
-        rest: &[Vec3],
         how: &CurveDeform<'_>,
         out: &mut [Vec3],
         with_rotations: bool,
@@ -105,7 +105,6 @@ kernel! { avx512
 fn follow_task(
     curves: Range<usize>,
     starts: &[u32],
-    rest: &[Vec3],
     how: &CurveDeform<'_>,
     out: &mut [Vec3],
     with_rotations: bool,
@@ -122,7 +121,7 @@ fn follow_task(
     let mut first = curves.start;
     while first < curves.end {
         let end = if curves.end - first > LANES { first + LANES } else { curves.end };
-        let hairs = HairLanes::of(first..end, starts, rest, how);
+        let hairs = HairLanes::of(first..end, starts, how);
         hairs.follow(&mut scratch, base, out, &mut done);
         first = end;
     }

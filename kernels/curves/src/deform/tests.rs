@@ -65,7 +65,7 @@ fn deformed(hairs: &Curves, guides: [&Curves; 2], weights: &GuideWeights, blend:
         blend: Masked::uniform(blend),
         keep_out: None,
     };
-    deform_curves(&hairs.starts, &hairs.points, &how, false).points
+    deform_curves(&hairs.starts, &how, false).points
 }
 
 fn apart(a: &[Point], b: &[Point]) -> f64 {
@@ -152,6 +152,67 @@ fn turns_of_more_than_half_a_revolution_are_kept() {
     assert!(apart(&hair, &bent([0.0; 3], 0.1, &curl.map(|angle| 0.5 * angle))) < 1e-7);
 }
 
+/// Guides that pass half a turn one after the other carry the hair between them past it: by the normalised weighted mean of
+/// their rotations' quaternions, whose signs are those of turns that are nowhere far from each other. With `straight`
+/// segments that do not turn before those that do.
+#[test]
+fn guides_pass_half_a_turn_one_by_one() {
+    let roots: [Point; 3] = [[0.0; 3], [0.3, 0.0, 0.0], [0.0, 0.0, 0.2]];
+    let guides = |angles: [f64; 3], straight: usize| {
+        let guide = |k: usize| bent(roots[k], 0.1, &[&[0.0; 4][..straight], &[angles[k]; 4]].concat());
+        Curves::of(&[0, 1, 2].map(guide))
+    };
+    let degrees = |angle: f64| angle * PI / 180.0;
+    let root = [0.1, 0.0, 0.05];
+    for straight in [0, 4] {
+        let rest = guides([0.0; 3], straight);
+        let weights = weights(&rest, &Curves::of(&[vec![root; 2]]), 3);
+        assert!(weights.of(0).iter().all(|guide| guide.weight > 0.1), "all three count");
+        let mean = |angles: [f64; 3]| {
+            let parts = weights.of(0).iter().map(|guide| (f64::from(guide.weight), angles[guide.guide as usize]));
+            let [w, z] = parts.fold([0.0, 0.0], |[w, z], (weight, angle)| {
+                let (sine, cosine) = libm::sincos(0.5 * angle);
+                [w + weight * cosine, z + weight * sine]
+            });
+            2.0 * libm::atan2(z, w)
+        };
+        // One CV more than segments that turn: in the middle of all others, guides have the turn of one segment.
+        let hair = |angle: f64, lean: f64| {
+            let angles: Vec<f64> = (0..straight + 4).map(|k| lean + if k < straight { 0.0 } else { angle }).collect();
+            Curves::of(&[bent(root, 0.02, &angles)])
+        };
+        // Not by half a turn exactly, whose axis is not known.
+        for angles in [[170.0, 179.99, 190.0], [190.0, 170.0, 181.0], [179.0, 185.0, 181.0], [240.0, 140.0, 181.0]] {
+            let angles = angles.map(degrees);
+            let now = deformed(&hair(0.0, 0.3), [&rest, &guides(angles, straight)], &weights, 1.0);
+            let expected = hair(mean(angles), 0.3).points;
+            assert!(apart(&now, &expected) < 1e-6, "{angles:?}: {now:?}, not {expected:?}");
+        }
+        for order in [[0.0, 10.0, 20.0], [20.0, 10.0, 0.0], [0.0, 60.0, 35.0]] {
+            let frames = (0..400).map(|frame| order.map(|ahead| degrees(100.25 + 0.5 * f64::from(frame) + ahead)));
+            for angles in frames.filter(|angles| angles.iter().all(|angle| *angle < degrees(260.0))) {
+                let now = deformed(&hair(0.0, 0.3), [&rest, &guides(angles, straight)], &weights, 1.0);
+                assert!(apart(&now, &hair(mean(angles), 0.3).points) < 1e-6, "{angles:?}");
+            }
+        }
+    }
+}
+
+/// On the two sides of a parting guides lie down to the left and to the right: the hair between them stands, though the way
+/// from one to the other is shorter through the skin.
+#[test]
+fn hairs_of_a_parting_stand() {
+    let upright = |x: f32| bent([x, 0.0, 0.0], 0.1, &[0.0; 3]);
+    let rest = Curves::of(&[upright(-0.2), upright(0.2)]);
+    let hairs = Curves::of(&[upright(0.0)]);
+    for degrees in [[80.0, -80.0], [91.0, -91.0], [115.0, -115.0], [140.0, -95.0], [100.0, -135.0_f64]] {
+        let [left, right] = degrees.map(|angle| angle * PI / 180.0);
+        let now = Curves::of(&[bent([-0.2, 0.0, 0.0], 0.1, &[left; 3]), bent([0.2, 0.0, 0.0], 0.1, &[right; 3])]);
+        let hair = deformed(&hairs, [&rest, &now], &weights(&rest, &hairs, 2), 1.0);
+        assert!(apart(&hair, &bent([0.0; 3], 0.1, &[0.5 * (left + right); 3])) < 1e-7, "{degrees:?}");
+    }
+}
+
 /// Guides that lie down on a floor lay hairs down on a wall, too: turns are those in the frames of roots.
 #[test]
 fn turns_are_carried_from_frame_to_frame() {
@@ -182,7 +243,7 @@ fn last_cvs_turn_with_their_segments() {
     let blend = Masked::uniform(1.0);
     let how = CurveDeform { guides: &guides, turns: &turns, poses: None, blend, keep_out: None };
     let turn = rotation(DVec3::z(), 0.7);
-    for found in deform_curves(&hairs.starts, &hairs.points, &how, true).rotations {
+    for found in deform_curves(&hairs.starts, &how, true).rotations {
         assert!((found.coords - turn.coords).amax() < 1e-6, "{found:?}");
     }
 }
@@ -207,7 +268,7 @@ fn rigid_motion_of_the_guides_moves_hairs_rigidly() {
             blend,
             keep_out: None,
         };
-        let deformed = deform_curves(&hairs.starts, &hairs.points, &how, true);
+        let deformed = deform_curves(&hairs.starts, &how, true);
         assert!(apart(&deformed.points, &hairs.moved(rigid).points) < 2e-6, "{axis:?}");
         let off = |found: &DQuat| (found.coords - turn.coords).amax().min((found.coords + turn.coords).amax());
         assert!(deformed.rotations.iter().all(|found| off(found) < 1e-5));
@@ -251,7 +312,7 @@ fn lengths_are_kept_whatever_guides_do() {
     for blend in [1.0, 0.3] {
         let blend = Masked::uniform(blend);
         let how = CurveDeform { guides: &of_hairs, turns: &turns, poses: None, blend, keep_out: None };
-        let deformed = deform_curves(&hairs.starts, &hairs.points, &how, false);
+        let deformed = deform_curves(&hairs.starts, &how, false);
         assert!(deformed.points.as_flattened().iter().all(|x| x.is_finite()));
         assert!(deformed.length_error < 1e-5, "{}", deformed.length_error);
     }

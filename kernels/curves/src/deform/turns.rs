@@ -62,6 +62,18 @@ impl LaneTurns {
         }
     }
 
+    /// Products of their quaternions, summed over the four parts.
+    #[inline(always)]
+    pub(super) fn dot(&self, other: &Self) -> F64x16 {
+        let ([w, x, y, z], [a, b, c, d]) = (&self.0, &other.0);
+        let mut dot = F64x16::ZERO;
+        for lane in 0..LANES {
+            let axes = x.0[lane] * b.0[lane] + y.0[lane] * c.0[lane] + z.0[lane] * d.0[lane];
+            dot.0[lane] = w.0[lane] * a.0[lane] + axes;
+        }
+        dot
+    }
+
     /// Their lengths as quaternions.
     #[inline(always)]
     pub(super) fn sizes(&self) -> F64x16 {
@@ -162,8 +174,17 @@ impl GuideSegments {
 pub struct GuideTurns {
     /// Of each row, in the frame of the root of its guide; that which ends a guide repeats its last.
     rows: Vec<Row>,
-    /// From where the skin carries each root to where it is, in the same frame, metres. The first is that of no guide.
-    offsets: Vec<DVec3>,
+    /// The first is that of no guide.
+    guides: Vec<GuideTurn>,
+}
+
+/// What is the same for all of a guide's segments.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct GuideTurn {
+    /// From where the skin carries the root to where it is, in the frame of the rows, metres.
+    pub(super) offset: DVec3,
+    /// The least w of the guide's rows.
+    pub(super) least_w: f64,
 }
 
 /// The rotation of a segment, and what is added to it up to the next segment's; on one line of the cache.
@@ -198,33 +219,35 @@ impl GuideTurns {
     ) -> Self {
         let guides = starts.len().saturating_sub(1);
         let still = Row { here: STILL, step: [0.0; 4] };
-        let (mut rows, mut offsets) = (vec![still; segments.middles.len()], vec![DVec3::zeros(); guides + 1]);
+        let none = GuideTurn { offset: DVec3::zeros(), least_w: 1.0 };
+        let (mut rows, mut of_guides) = (vec![still; segments.middles.len()], vec![none; guides + 1]);
         let mut left = &mut rows[2..];
         let mut tasks = Vec::new();
-        for (first, offsets) in (0..guides).step_by(TASK).zip(offsets[1..].chunks_mut(TASK)) {
-            let guides = first..first + offsets.len();
+        for (first, of_guides) in (0..guides).step_by(TASK).zip(of_guides[1..].chunks_mut(TASK)) {
+            let guides = first..first + of_guides.len();
             let rows = guides.clone().map(|guide| rows_of(starts[guide + 1] - starts[guide])).sum();
             let (mine, others) = left.split_at_mut(rows);
-            tasks.push((guides, mine, offsets));
+            tasks.push((guides, mine, of_guides));
             left = others;
         }
-        parallel::for_each(tasks, |_, (guides, mut rows, offsets)| {
-            for (guide, offset) in guides.zip(offsets) {
+        parallel::for_each(tasks, |_, (guides, mut rows, of_guides)| {
+            for (guide, of_guide) in guides.zip(of_guides) {
                 let cvs = starts[guide] as usize..starts[guide + 1] as usize;
                 let still = RootPose { translation: DVec3::zeros(), rotation: DQuat::identity(), lost: false };
                 let pose = poses.map_or(still, |poses| poses[guide]);
                 let (mine, others) = rows.split_at_mut(rows_of(starts[guide + 1] - starts[guide]));
-                *offset = write_turns(&rest[cvs.clone()], &now[cvs], &pose, mine);
+                of_guide.offset = write_turns(&rest[cvs.clone()], &now[cvs], &pose, mine);
+                of_guide.least_w = mine.iter().fold(1.0, |least: f64, row| least.min(row.here[0]));
                 rows = others;
             }
         });
-        Self { rows, offsets }
+        Self { rows, guides: of_guides }
     }
 
-    /// The offset of the root of a guide, counted from 1; 0 for no guide.
+    /// That of a guide, counted from 1; 0 for no guide.
     #[inline(always)]
-    pub(super) fn offset(&self, guide: u32) -> &DVec3 {
-        &self.offsets[guide as usize]
+    pub(super) fn of_guide(&self, guide: u32) -> &GuideTurn {
+        &self.guides[guide as usize]
     }
 
     /// The rotation at the place on a guide of one lane, interpolated between the middles of the guide's segments.

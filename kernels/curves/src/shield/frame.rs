@@ -2,7 +2,8 @@
 //! power-of-two unit in which all coordinates are below 2.
 
 use super::Collider;
-use numerics::lanes::{F64x16, LANES, Lanes};
+use numerics::lanes::{F32x16, F64x16, LANES, Lanes, get, set};
+use numerics::simd::{Path, kernel};
 use numerics::vector::{self, DVec3, Vec3, direction, to_f32, to_f64};
 
 /// The map from the scene to the frame.
@@ -43,9 +44,10 @@ impl Frame {
     /// `None` if `wind` has no direction.
     pub(super) fn of(wind: [f64; 3], points: &[Vec3], colliders: &[Collider<'_>]) -> Option<Self> {
         let upwind = direction(-DVec3::from(wind))?;
-        let bounds = Bounds::of(points);
+        let path = Path::chosen();
+        let bounds = bounds_of(path, points);
         let centre = bounds.centre();
-        let reach = colliders.iter().map(|collider| Bounds::of(collider.points).reach(centre));
+        let reach = colliders.iter().map(|collider| bounds_of(path, collider.points).reach(centre));
         let extent = reach.fold(bounds.reach(centre), f64::max);
         let exponent = if extent > 0.0 { libm::ilogb(extent) } else { 0 };
         let unit = libm::scalbn(1.0, -exponent);
@@ -57,15 +59,15 @@ impl Frame {
         Some(Self { centre, axes, unit })
     }
 
-    /// A point of the scene in the frame.
-    #[inline(always)]
+    /// A point of the scene in the frame, without lanes.
+    #[cfg(test)]
     pub(super) fn at(&self, point: Vec3) -> Vec3 {
         let from_centre = to_f64(point) - self.centre;
         let [a, b, c] = &self.axes;
         [a.dot(&from_centre) as f32, b.dot(&from_centre) as f32, c.dot(&from_centre) as f32]
     }
 
-    /// Points of the scene in the frame, each as [`Frame::at`] gives it.
+    /// Points of the scene in the frame.
     #[inline(always)]
     pub(super) fn at_lanes(&self, points: &Lanes<3>) -> Lanes<3> {
         let mut from_centre = [F64x16::ZERO; 3];
@@ -105,7 +107,59 @@ impl Frame {
     }
 }
 
+kernel! {
+    /// Writes points of the scene in the frame.
+    pub(super) fn write_framed(frame: &Frame, points: &[Vec3], framed: &mut [Vec3]) = write_framed_body;
+}
+
+#[inline(always)]
+fn write_framed_body(frame: &Frame, points: &[Vec3], framed: &mut [Vec3]) {
+    for (framed, points) in framed.chunks_mut(LANES).zip(points.chunks(LANES)) {
+        let mut at = [F32x16::splat(0.0); 3];
+        for lane in 0..points.len() {
+            set(&mut at, lane, points[lane]);
+        }
+        let at = frame.at_lanes(&at);
+        for lane in 0..framed.len() {
+            framed[lane] = get(&at, lane);
+        }
+    }
+}
+
+kernel! {
+    /// [`Bounds::of`] for many points.
+    fn bounds_of(points: &[Vec3]) -> Bounds = bounds_of_body;
+}
+
+/// Coordinates of sixteen points.
+const COORDINATES: usize = 3 * LANES;
+
+#[inline(always)]
+fn bounds_of_body(points: &[Vec3]) -> Bounds {
+    // As they lie in memory: those that are a multiple of three apart are along the same axis.
+    let (mut low, mut high) = ([f32::INFINITY; COORDINATES], [f32::NEG_INFINITY; COORDINATES]);
+    let (sixteens, others) = points.as_flattened().as_chunks::<COORDINATES>();
+    for coordinates in sixteens {
+        for k in 0..COORDINATES {
+            let x = coordinates[k];
+            let finite = x.abs() < f32::INFINITY;
+            low[k] = if finite & (x < low[k]) { x } else { low[k] };
+            high[k] = if finite & (x > high[k]) { x } else { high[k] };
+        }
+    }
+    let mut bounds = Bounds { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
+    for k in 0..COORDINATES {
+        bounds.add(k % 3, low[k]);
+        bounds.add(k % 3, high[k]);
+    }
+    for (k, x) in others.iter().enumerate() {
+        bounds.add(k % 3, *x);
+    }
+    bounds.or_zero()
+}
+
 /// Smallest and largest coordinates; both 0 without points.
+#[derive(Debug, PartialEq)]
 struct Bounds {
     low: Vec3,
     high: Vec3,
@@ -115,16 +169,33 @@ impl Bounds {
     /// Bounds of the points, coordinates that are not finite ignored.
     #[inline(always)]
     fn of(points: &[Vec3]) -> Self {
-        let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        let mut bounds = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
         for point in points {
             for axis in 0..3 {
-                let x = if point[axis].abs() < f32::INFINITY { point[axis] } else { f32::NAN };
-                low[axis] = if x < low[axis] { x } else { low[axis] };
-                high[axis] = if x > high[axis] { x } else { high[axis] };
+                bounds.add(axis, point[axis]);
             }
         }
-        let some = |axis: usize, x: f32| if low[axis] <= high[axis] { x } else { 0.0 };
-        Self { low: [0, 1, 2].map(|axis| some(axis, low[axis])), high: [0, 1, 2].map(|axis| some(axis, high[axis])) }
+        bounds.or_zero()
+    }
+
+    /// Adds a coordinate, unless it is not finite.
+    #[inline(always)]
+    fn add(&mut self, axis: usize, x: f32) {
+        let x = if x.abs() < f32::INFINITY { x } else { f32::NAN };
+        self.low[axis] = if x < self.low[axis] { x } else { self.low[axis] };
+        self.high[axis] = if x > self.high[axis] { x } else { self.high[axis] };
+    }
+
+    /// The same, with 0 along axes without coordinates.
+    #[inline(always)]
+    fn or_zero(self) -> Self {
+        let mut bounds = Self { low: [0.0; 3], high: [0.0; 3] };
+        for axis in 0..3 {
+            if self.low[axis] <= self.high[axis] {
+                (bounds.low[axis], bounds.high[axis]) = (self.low[axis], self.high[axis]);
+            }
+        }
+        bounds
     }
 
     fn centre(&self) -> DVec3 {
@@ -151,6 +222,31 @@ mod tests {
             assert!([a, b, c].iter().all(|axis| (axis.norm_squared() - 1.0).abs() < 1e-15));
             assert!((c.dot(&direction(wind.into()).unwrap()) + 1.0).abs() < 1e-15);
         }
+    }
+
+    #[test]
+    fn bounds_of_many_points_are_those_of_each() {
+        let coordinate = |k: u64| match k % 41 {
+            7 => f32::NAN,
+            8 => f32::INFINITY,
+            9 => f32::NEG_INFINITY,
+            _ => numerics::random::Key::new(5).of(k).between([-3.0, 2.0]),
+        };
+        for count in [0, 1, 2, 15, 16, 17, 100, 333] {
+            let points: Vec<Vec3> = (0..count).map(|k| [3 * k, 3 * k + 1, 3 * k + 2].map(coordinate)).collect();
+            for path in Path::all() {
+                assert_eq!(bounds_of(path, &points), Bounds::of(&points), "{count}");
+            }
+        }
+    }
+
+    #[test]
+    fn many_points_are_framed_as_each_is() {
+        let points: Vec<Vec3> = (0..333).map(|k| [k as f32, 0.1 * k as f32, 5.0 - k as f32]).collect();
+        let frame = Frame::of([1.0, 0.3, -0.2], &points, &[]).unwrap();
+        let mut framed = vec![[0.0; 3]; points.len()];
+        write_framed(Path::chosen(), &frame, &points, &mut framed);
+        assert!(framed.iter().zip(&points).all(|(framed, point)| *framed == frame.at(*point)));
     }
 
     #[test]

@@ -241,13 +241,14 @@ fn write_areas_body(blocks: &[Block], areas: &mut [F32x16]) {
 impl Obstacle {
     /// A collider in the frame.
     fn of(frame: &Frame, collider: &Collider<'_>, with_edges: bool) -> Self {
-        let mut points = vec![[0.0; 3]; collider.points.len()];
-        parallel::fill(&mut points, TASK_POINTS, |point| frame.at(collider.points[point]));
+        let (path, mut points) = (Path::chosen(), vec![[0.0; 3]; collider.points.len()]);
+        let tasks = points.chunks_mut(TASK_POINTS).zip(collider.points.chunks(TASK_POINTS));
+        parallel::for_each(tasks, |_, (framed, points)| frame::write_framed(path, frame, points, framed));
         let tree = match collider.tree {
             Some(tree) => tree.moved(&points),
             None => TriangleTree::build(&points, collider.triangles),
         };
-        let (path, mut areas) = (Path::chosen(), vec![F32x16::splat(0.0); tree.blocks().len()]);
+        let mut areas = vec![F32x16::splat(0.0); tree.blocks().len()];
         let tasks = areas.chunks_mut(TASK_GROUPS).zip(tree.blocks().chunks(TASK_GROUPS));
         parallel::for_each(tasks, |_, (areas, blocks)| write_areas(path, blocks, areas));
         let (low, high) = tree.bounds();

@@ -64,6 +64,17 @@ pub(crate) struct ClearLanes<'a> {
     /// 1 for each curve that has met nothing so far, else 0. Not whole numbers, whose selection by comparisons of `f32` the
     /// compiler leaves scalar.
     clear: F32x16,
+    /// For each segment a bit for each curve on which it is below something near; the last for all further segments too.
+    below: [u16; SEGMENT_BITS],
+}
+
+/// Number of segments of a curve that are told apart.
+const SEGMENT_BITS: usize = u32::BITS as usize;
+
+/// The bit of a curve's segment `k`; the last is that of all further segments too.
+#[inline(always)]
+pub(in crate::collide) fn segment_bit(k: usize) -> usize {
+    if k < SEGMENT_BITS - 1 { k } else { SEGMENT_BITS - 1 }
 }
 
 impl<'a> ClearLanes<'a> {
@@ -71,7 +82,8 @@ impl<'a> ClearLanes<'a> {
     #[inline(always)]
     pub(in crate::collide) fn of(bounds: &'a ClearBounds, gap: f64) -> Self {
         let zero = F32x16::splat(0.0);
-        Self { bounds, untested: (SKIPPED_GAPS * gap) as f32, height: zero, square: zero, clear: bounds.curves }
+        let (untested, below) = ((SKIPPED_GAPS * gap) as f32, [0; SEGMENT_BITS]);
+        Self { bounds, untested, height: zero, square: zero, clear: bounds.curves, below }
     }
 
     /// Adds the CVs `k`, of which those before 0 and 1 have been added; curves without one repeat their last.
@@ -93,9 +105,13 @@ impl<'a> ClearLanes<'a> {
             }
             rise = lowest;
         }
+        let mut above = 0;
         for lane in 0..LANES {
-            self.clear.0[lane] = if lower.0[lane] > rise.0[lane] { self.clear.0[lane] } else { 0.0 };
+            let is_above = lower.0[lane] > rise.0[lane];
+            self.clear.0[lane] = if is_above { self.clear.0[lane] } else { 0.0 };
+            above |= u16::from(is_above) << lane;
         }
+        self.below[segment_bit(k - 1)] |= !above;
         (self.height, self.square) = (height, square);
         self.check_finite();
     }
@@ -109,6 +125,20 @@ impl<'a> ClearLanes<'a> {
             mask |= u16::from(self.clear.0[lane] > 0.0) << lane;
         }
         mask
+    }
+
+    /// Of a curve of so many CVs, not one of [`Self::mask`], a bit for each segment that is not above all obstacles
+    /// near it, but for the length at its start that is not tested; the last of them for all further segments too. All bits
+    /// if there is none, as of a curve with a coordinate that is NaN or infinite.
+    #[inline(always)]
+    pub(crate) fn segments_below(&self, lane: usize, cvs: usize) -> u32 {
+        let mut bits = 0;
+        for k in 0..SEGMENT_BITS {
+            if k + 1 < cvs {
+                bits |= u32::from(self.below[k] >> lane & 1) << k;
+            }
+        }
+        if bits == 0 { u32::MAX } else { bits }
     }
 
     /// Comparisons with the next CV would overlook one that is not.
