@@ -2,6 +2,7 @@
 //! clusters at both ends. Each cluster can then be computed on its own, and most springs are visited only once.
 
 use crate::partition::Partition;
+use std::ops::Range;
 
 /// A spring as seen from one of its ends.
 #[derive(Clone, Copy, Debug, Default)]
@@ -60,6 +61,19 @@ impl Adjacency {
             [self.starts[particle], self.middles[particle], self.starts[particle + 1]].map(|at| at as usize);
         [&all[start..middle], &all[middle..end]]
     }
+
+    /// [`Self::of`] for each of some `particles`.
+    #[inline(always)]
+    pub fn each<'a, T>(&'a self, particles: Range<usize>, all: &'a [T]) -> impl Iterator<Item = [&'a [T]; 2]> {
+        let starts = &self.starts[particles.start..=particles.end];
+        let mut left = &all[starts[0] as usize..];
+        starts.windows(2).zip(&self.middles[particles]).map(move |(ends, middle)| {
+            let (inside, others) = left.split_at((middle - ends[0]) as usize);
+            let (across, others) = others.split_at((ends[1] - middle) as usize);
+            left = others;
+            [inside, across]
+        })
+    }
 }
 
 #[cfg(test)]
@@ -75,6 +89,11 @@ mod tests {
                 .of(particle, &adjacency.incident)
                 .map(|some| some.iter().map(|incident| incident.other).collect::<Vec<_>>())
         };
+        let each: Vec<_> = adjacency.each(1..4, &adjacency.incident).collect();
+        for (particle, each) in (1..4).zip(each) {
+            let all = adjacency.of(particle, &adjacency.incident);
+            assert!(each.iter().zip(all).all(|(each, all)| std::ptr::eq(*each, all)), "{particle}");
+        }
         assert_eq!(others(0), [vec![1], vec![4]]);
         assert_eq!(others(1), [vec![2], vec![3]]);
         assert_eq!(others(2), [vec![], vec![]]);

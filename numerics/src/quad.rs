@@ -36,11 +36,42 @@ impl Quad {
         self.0[3]
     }
 
+    /// The same with another fourth lane.
+    #[inline(always)]
+    pub fn with_fourth(self, fourth: f64) -> Self {
+        Self([self.0[0], self.0[1], self.0[2], fourth])
+    }
+
+    /// All lanes rounded to `f32`.
+    #[inline(always)]
+    pub fn narrowed(self) -> [f32; 4] {
+        self.0.map(|x| x as f32)
+    }
+
+    /// The vector whose lanes are those of these numbers.
+    #[inline(always)]
+    pub fn permuted(self, lanes: [usize; 4]) -> Self {
+        Self(lanes.map(|lane| self.0[lane]))
+    }
+
+    /// The vector product.
+    #[inline(always)]
+    pub fn cross(self, other: Self) -> Self {
+        const LEFT: [usize; 4] = [1, 2, 0, 3];
+        const RIGHT: [usize; 4] = [2, 0, 1, 3];
+        self.permuted(LEFT) * other.permuted(RIGHT) - self.permuted(RIGHT) * other.permuted(LEFT)
+    }
+
     /// The scalar product of x, y, z.
     #[inline(always)]
     pub fn dot(self, other: Self) -> f64 {
-        let products = self.lanes(other, |a, b| a * b).0;
-        products[0] + products[1] + products[2]
+        (self * other).total()
+    }
+
+    /// x + y + z.
+    #[inline(always)]
+    pub fn total(self) -> f64 {
+        self.0[0] + self.0[1] + self.0[2]
     }
 
     #[inline(always)]
@@ -64,6 +95,16 @@ impl Sub for Quad {
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
         self.lanes(other, |a, b| a - b)
+    }
+}
+
+/// Lane by lane.
+impl Mul for Quad {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.lanes(other, |a, b| a * b)
     }
 }
 
@@ -99,13 +140,17 @@ mod tests {
         let [a, b] = [[0.1, -0.7, 1e-9], [3.3, 0.2, -1.7]].map(DVec3::from);
         let [p, q] = [a, b].map(Quad::new);
         assert_eq!([(p + q).xyz(), (p - q).xyz(), (p * 0.3).xyz()], [a + b, a - b, a * 0.3]);
-        assert_eq!(p.dot(q), a.dot(&b));
+        assert_eq!((p.dot(q), p.total()), (a.dot(&b), a.x + a.y + a.z));
+        assert_eq!([(p * q).xyz(), p.cross(q).xyz()], [a.component_mul(&b), a.cross(&b)]);
         let (mut sum, mut quad) = (a, p);
         sum += b;
         sum -= a * 0.1;
         quad += q;
         quad -= p * 0.1;
         assert_eq!(quad.xyz(), sum);
+        let turned = p.with_fourth(7.0).permuted([3, 0, 0, 1]);
+        assert_eq!((turned.xyz(), turned.fourth()), (DVec3::new(7.0, a.x, a.x), a.y));
+        assert_eq!(p.narrowed()[..3], a.map(|x| x as f32).as_slice()[..]);
         let wide = Quad::widened([0.5, 0.1, -2.0, 7.0]);
         assert_eq!((wide.xyz(), wide.fourth()), (DVec3::new(0.5, f64::from(0.1_f32), -2.0), 7.0));
     }

@@ -6,6 +6,7 @@ use super::stage::{BodySolver, FrameContext, Stage};
 use super::system::{System, smoother, solve_lower};
 use numerics::partition::{Partition, RaggedSlice};
 use numerics::rank_one::{RankOneTerms, add_square};
+use numerics::simd::Path;
 use numerics::vector::DVec3;
 
 /// Factor on the regions' contribution to a particle's own diagonal block. The block smoother then accounts for part
@@ -155,7 +156,9 @@ impl BodySolver {
         let solver = &*self;
         clusters.for_each((sums, inertia, records), |cluster, (sums, inertia, records)| {
             let particles = clusters.range(cluster);
-            springs::linearise(&body.adjacency, &solver.links, records, x, stage.a, particles.clone(), sums);
+            let path = Path::chosen();
+            let springs = (&body.adjacency, &solver.links[..]);
+            springs::linearise(path, springs, records, x, stage.a, particles.clone(), sums);
             for ((particle, sums), inertia) in particles.zip(sums).zip(inertia) {
                 sums.others = solver.own_force(regions, stage, particle, [x, v]);
                 regions.add_block(particle, OVERLAP, usize::MAX, &mut sums.block);
@@ -178,6 +181,7 @@ impl BodySolver {
         let (body, a) = (stage.context.body, stage.a);
         let clusters = &body.order.clusters;
         self.system.blocks.clear();
+        self.system.in_contact.clear();
         self.system.anchors = self.thin_tets.len();
         let (mut starts, mut particles, mut along) = (vec![0u32], Vec::new(), Vec::new());
         for thin in &self.thin_tets {
@@ -196,6 +200,7 @@ impl BodySolver {
             let mut sides = contact.sides();
             if let (Some((particle, weight)), None) = (sides.next(), sides.next()) {
                 self.system.blocks.resize(body.len(), [0.0; 6]);
+                self.system.in_contact.push(particle as u32);
                 let block = &mut self.system.blocks[particle];
                 directions.for_each(|direction| add_square(block, direction, weight * weight));
                 continue;
@@ -209,6 +214,8 @@ impl BodySolver {
             }
             self.system.anchors = if two_sided { self.system.anchors } else { starts.len() - 1 };
         }
+        self.system.in_contact.sort_unstable();
+        self.system.in_contact.dedup();
         let partition = Partition::even(starts.len() - 1, 512, 1);
         let transient: &mut RankOneTerms = &mut self.system.transient;
         transient.set_topology(body.len(), &starts, &particles, partition);

@@ -142,7 +142,8 @@ impl Stepper<'_> {
             let wrong = 4.0 * wrong / (mass * h * h);
             if wrong > 0.0 { (wrong / scale).sqrt() } else { 0.0 }
         };
-        let is_held = |piece: &std::ops::Range<usize>| self.context.external.held[piece.clone()].contains(&true);
+        let held = &self.context.external.held;
+        let is_held = |piece: &std::ops::Range<usize>| held[body.particles(piece)].contains(&true);
         let pieces = body.order.pieces.iter().enumerate();
         let is_heap = |piece| self.solver.heaps.get(body.particles(piece).start) == Some(&true);
         let free = pieces.filter(|(index, piece)| touched[*index] >= 0.0 && !is_held(piece) && !is_heap(piece));

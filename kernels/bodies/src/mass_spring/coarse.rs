@@ -10,7 +10,8 @@ use super::system::{System, solve_lower, solve_lower_transpose, times};
 use numerics::adjacency::Adjacency;
 use numerics::cluster_order::ClusterOrder;
 use numerics::partition::Partition;
-use numerics::vector::{DMat3, DVec3, Vec3, to_f32, to_f64};
+use numerics::quad::Quad;
+use numerics::vector::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// Rigid motions of a cluster: three translations, three rotations.
@@ -116,20 +117,21 @@ impl Layout {
         let mut first: Vec<u32> = (0..order.clusters.len() as u32).collect();
         for particle in 0..order.caller_of.len() {
             let [_, across] = adjacency.of(particle, &adjacency.incident);
-            across.iter().for_each(|incident| layout.join(&mut first, &[particle as u32, incident.other]));
+            across.iter().for_each(|incident| layout.join(&mut first, [particle, incident.other as usize].into_iter()));
         }
         for ends in regions.starts.windows(2) {
-            layout.join(&mut first, &regions.particles[ends[0] as usize..ends[1] as usize]);
+            let particles = &regions.particles[ends[0] as usize..ends[1] as usize];
+            layout.join(&mut first, particles.iter().map(|particle| *particle as usize));
         }
         layout.first = first;
         layout
     }
 
     /// Extends the envelope `first` by the coupling between the clusters of `particles`.
-    pub(super) fn join(&self, first: &mut [u32], particles: &[u32]) {
-        let clusters = || particles.iter().map(|particle| self.cluster[*particle as usize]);
-        let Some(least) = clusters().min() else { return };
-        clusters().for_each(|cluster| first[cluster as usize] = first[cluster as usize].min(least));
+    pub(super) fn join(&self, first: &mut [u32], particles: impl Iterator<Item = usize> + Clone) {
+        let clusters = particles.map(|particle| self.cluster[particle]);
+        let Some(least) = clusters.clone().min() else { return };
+        clusters.for_each(|cluster| first[cluster as usize] = first[cluster as usize].min(least));
     }
 
     /// The piece of a particle.
@@ -145,15 +147,15 @@ impl Layout {
 
 /// Offset of each particle from the centroid of its cluster, in units of the cluster's radius: the lever arm of
 /// rotations.
-pub(super) fn offset_from_centroid(clusters: &Partition, x: &[DVec3], offset_from_centroid: &mut Vec<Vec3>) {
-    offset_from_centroid.resize(x.len(), [0.0; 3]);
-    clusters.for_each(&mut offset_from_centroid[..], |cluster, mine: &mut [Vec3]| {
+pub(super) fn offset_from_centroid(clusters: &Partition, x: &[DVec3], offset_from_centroid: &mut Vec<[f32; 4]>) {
+    offset_from_centroid.resize(x.len(), [0.0; 4]);
+    clusters.for_each(&mut offset_from_centroid[..], |cluster, mine: &mut [[f32; 4]]| {
         let points = &x[clusters.range(cluster)];
         let middle = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
         let radius = points.iter().map(|p| (p - middle).amax()).fold(0.0, f64::max);
         let scale = if radius > 0.0 { 1.0 / radius } else { 0.0 };
         for (offset, p) in mine.iter_mut().zip(points) {
-            *offset = to_f32((p - middle) * scale);
+            *offset = Quad::new((p - middle) * scale).narrowed();
         }
     });
 }
@@ -161,25 +163,37 @@ pub(super) fn offset_from_centroid(clusters: &Partition, x: &[DVec3], offset_fro
 /// Rigid motions of clusters, as particles follow them.
 #[derive(Clone, Copy)]
 pub(super) struct ClusterMotions<'a> {
-    pub(super) offset_from_centroid: &'a [Vec3],
+    pub(super) offset_from_centroid: &'a [[f32; 4]],
     pub(super) filters: &'a ContactFilters,
 }
 
 impl ClusterMotions<'_> {
-    /// Displacement of a particle along `direction` by each rigid motion of its cluster; the force and torque on the cluster
-    /// by a force on it.
+    /// Offset of a particle from the centroid of its cluster.
     #[inline(always)]
-    pub(super) fn along(&self, particle: usize, direction: DVec3) -> [f64; MODES] {
-        let direction = self.filters.at(particle).map_or(direction, |filter| filter.tr_mul(&direction));
-        let turned = to_f64(self.offset_from_centroid[particle]).cross(&direction);
-        [direction.x, direction.y, direction.z, turned.x, turned.y, turned.z]
+    pub(super) fn offset(&self, particle: usize) -> Quad {
+        Quad::widened(self.offset_from_centroid[particle])
     }
 
-    /// Displacement of a particle by the rigid motion `modes` of its cluster.
+    /// Displacement of a particle along `direction` by each rigid motion of its cluster, the translations and the rotations;
+    /// the force and torque on the cluster by a force on it.
     #[inline(always)]
-    pub(super) fn moved(&self, modes: &[f64], particle: usize) -> DVec3 {
-        let turn = DVec3::new(modes[3], modes[4], modes[5]);
-        let free = DVec3::new(modes[0], modes[1], modes[2]) + turn.cross(&to_f64(self.offset_from_centroid[particle]));
-        self.filters.at(particle).map_or(free, |filter| filter * free)
+    pub(super) fn along(&self, particle: usize, direction: Quad) -> [Quad; 2] {
+        let filter = self.filters.at(particle);
+        let direction = filter.map_or(direction, |filter| Quad::new(filter.tr_mul(&direction.xyz())));
+        [direction, self.offset(particle).cross(direction)]
     }
+
+    /// Displacement of a particle by a rigid motion of its cluster.
+    #[inline(always)]
+    pub(super) fn moved(&self, [shift, turn]: [Quad; 2], particle: usize) -> Quad {
+        let free = shift + turn.cross(self.offset(particle));
+        self.filters.at(particle).map_or(free, |filter| Quad::new(filter * free.xyz()))
+    }
+}
+
+/// The numbers of translations and rotations.
+#[inline(always)]
+pub(super) fn modes([shift, turn]: [Quad; 2]) -> [f64; MODES] {
+    let [shift, turn] = [shift.xyz(), turn.xyz()];
+    [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z]
 }

@@ -9,6 +9,7 @@
 use super::contact::ContactConstraint;
 use super::predictor::RigidMotion;
 use super::stage::{BodySolver, Stage};
+use numerics::quad::Quad;
 use numerics::vector::DVec3;
 
 /// Force and torque left on a body, and change of the sum of its loads, that are tolerated, relative to that sum. They
@@ -23,7 +24,7 @@ const TOLERATED_SINGLE: f64 = 0.5;
 const READABLE: f64 = 0.5;
 
 /// How far loads are from being the normal forces of bodies in balance; each for the body where it is the most.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct LoadBalance {
     /// Force left, or torque ÷ radius of gyration, and change of the sum of loads: relative to that sum, and ÷
     /// [`PRESSED`] where it is pressed.
@@ -31,8 +32,8 @@ pub(super) struct LoadBalance {
     change: f64,
     /// Change of single loads, relative to their sum.
     single: f64,
-    /// Whether there are any.
-    loaded: bool,
+    /// The bodies with loads, and what forces left on them are relative to, newtons.
+    bodies: Vec<(RigidMotion, f64)>,
 }
 
 impl LoadBalance {
@@ -46,7 +47,15 @@ impl LoadBalance {
 
     /// Whether there are loads that bodies are in balance under, and that are the normal forces: nothing bounces.
     pub(super) fn is_settled(&self) -> bool {
-        self.loaded && self.is_in_balance() && self.agrees()
+        !self.bodies.is_empty() && self.is_in_balance() && self.agrees()
+    }
+
+    /// Whether bodies at `x` are in balance but for a part of what is tolerated, with the residual `r` of a stage of `a`.
+    pub(super) fn holds(&self, a: f64, x: &[DVec3], r: &[Quad]) -> bool {
+        /// Part of what is tolerated.
+        const LEFT: f64 = 0.5;
+        let left = |(body, scale): &(RigidMotion, f64)| body.force_left(x, r) / (a * a * scale);
+        self.bodies.iter().all(|body| left(body) <= LEFT * TOLERATED)
     }
 
     /// Whether no more force is left on a body than its contacts exert.
@@ -95,14 +104,14 @@ impl BodySolver {
         if pieces.iter().all(|piece| piece.sum == 0.0 && piece.single == 0.0) {
             return balance;
         }
-        balance.loaded = true;
         let left: Vec<DVec3> = self.r.iter().zip(&body.mass).map(|(r, mass)| r / (stage.a * stage.a * mass)).collect();
         for (piece, loads) in
             body.order.pieces.iter().zip(&pieces).filter(|piece| piece.1.single > 0.0 || piece.1.sum > 0.0)
         {
             let pressed = 1.0 + (PRESSED - 1.0) * (1.0 - (loads.net.norm() / loads.sum).min(1.0));
-            let left = RigidMotion::new(body, &self.system.held, piece, [x, &left, &left]).force(body);
-            let left = if loads.sum > 0.0 { left / (loads.sum * pressed) } else { 0.0 };
+            let motion = RigidMotion::new(body, &self.system.held, piece, [x, &left, &left]);
+            let left = if loads.sum > 0.0 { motion.force(body) / (loads.sum * pressed) } else { 0.0 };
+            balance.bodies.push((motion, loads.sum * pressed));
             balance.left = balance.left.max(left);
             balance.change = balance.change.max(loads.change.abs() / (loads.sum * pressed));
             balance.single = balance.single.max(loads.single / loads.sum);
@@ -121,5 +130,32 @@ impl BodySolver {
             contact.friction_energy(&self.v, a, size) - before
         });
         a * a * more.sum::<f64>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::body::{Material, Mesh, SoftBody};
+    use super::*;
+    use crate::tets::cubes;
+
+    /// A block on which forces are left: the force, and the torque ÷ radius of gyration.
+    #[test]
+    fn bodies_are_in_balance_with_as_much_force_left_as_is_tolerated() {
+        let (points, tets) = cubes([3, 2, 2], [0.0; 3], [0.3, 0.2, 0.2]);
+        let material = Material { density: 1000.0.into(), stiffness: 1e4.into(), damping: 0.0.into() };
+        let body = SoftBody::new(&Mesh { points: &points, tets: &tets, ..Mesh::default() }, &material, &[]).unwrap();
+        let a = 0.04;
+        let forces = |x: &DVec3| DVec3::y() + DVec3::z().cross(x) * 3.0;
+        let left: Vec<DVec3> = body.rest.iter().zip(&body.mass).map(|(x, mass)| forces(x) / *mass).collect();
+        let r: Vec<Quad> = body.rest.iter().map(|x| Quad::new(forces(x) * (a * a))).collect();
+        let held = vec![false; body.len()];
+        let motion = RigidMotion::new(&body, &held, &body.order.pieces[0], [&body.rest, &left, &left]);
+        let force = motion.force(&body);
+        assert!((motion.force_left(&body.rest, &r) / (a * a * force) - 1.0).abs() < 1e-9);
+        for (loads, holds) in [(1.01, true), (0.99, false)] {
+            let bodies = vec![(motion.clone(), 2.0 * loads * force / TOLERATED)];
+            assert_eq!(LoadBalance { bodies, ..LoadBalance::default() }.holds(a, &body.rest, &r), holds);
+        }
     }
 }

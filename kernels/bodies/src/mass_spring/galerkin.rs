@@ -1,13 +1,15 @@
 //! The coarse (Galerkin) matrix PᵀAP, where P maps rigid motions of clusters to particles.
 
 use super::body::SoftBody;
-use super::coarse::{ClusterMotions, Layout, MODES};
+use super::coarse::{ClusterMotions, Layout, MODES, modes};
 use super::springs::Record;
 use super::system::System;
 use numerics::cholesky::EnvelopeMatrix;
 use numerics::partition::Partition;
+use numerics::quad::Quad;
 use numerics::rank_one::{RankOneTerms, add_square};
-use numerics::vector::{DMat3, DVec3, to_f64};
+use numerics::simd::{Path, kernel};
+use numerics::vector::{DMat3, DVec3};
 
 /// Contacts between bodies are left out where they make factoring more than this many times as dear.
 const DEARER: f64 = 8.0;
@@ -32,7 +34,7 @@ impl Galerkin<'_> {
         let mut matrix = EnvelopeMatrix::zeros((0..layout.rows()).map(begin));
         let bands = Partition::new(matrix.bands(MODES));
         bands.for_each(matrix.values_mut(), |cluster, out: &mut [f64]| {
-            write(&self.band(first[cluster] as usize, cluster), out);
+            write(&band(Path::chosen(), self, first[cluster] as usize, cluster), out);
         });
         self.add_rank_one_terms(&self.system.regions, usize::MAX, &mut matrix);
         self.add_rank_one_terms(transient, rows, &mut matrix);
@@ -41,18 +43,21 @@ impl Galerkin<'_> {
     }
 
     /// The blocks of a cluster's row from cluster `first` to the diagonal: springs and diagonal terms.
-    fn band(&self, first: usize, cluster: usize) -> Vec<Block> {
+    #[inline(always)]
+    fn band_body(&self, first: usize, cluster: usize) -> Vec<Block> {
         let Self { body, system, motions } = self;
-        let ClusterMotions { offset_from_centroid, filters } = motions;
+        let filters = motions.filters;
         let mut blocks = vec![Block::default(); cluster + 1 - first];
         let last = cluster - first;
         for particle in body.order.clusters.range(cluster) {
             let [inside, across] = body.adjacency.of(particle, &system.records);
-            inside.iter().for_each(|record| self.add_inside(particle, record, &mut blocks[last]));
+            for record in inside {
+                self.add_inside(particle, record, &mut blocks[last]);
+            }
             if system.held[particle] {
                 continue;
             }
-            let mine = to_f64(offset_from_centroid[particle]);
+            let mine = motions.offset(particle).xyz();
             let filter = filters.at(particle);
             // Stiffness and inertia of the particle itself.
             let mut own = system.blocks.get(particle).copied().unwrap_or_default();
@@ -63,17 +68,14 @@ impl Galerkin<'_> {
                 add_square(&mut own, w, 1.0);
                 let home = body.layout.cluster[other] as usize;
                 if home < cluster && !system.held[other] {
-                    let (block, far) = (&mut blocks[home - first], to_f64(offset_from_centroid[other]));
+                    let (block, far) = (&mut blocks[home - first], motions.offset(other).xyz());
                     if filter.is_none() && filters.at(other).is_none() {
                         block.add_alike(-alpha, mine, far);
                         block.add_along(-1.0, w, mine, far);
                     } else {
                         for (scale, direction) in directions(record) {
-                            block.add(
-                                -scale,
-                                &self.motions.along(particle, direction),
-                                &self.motions.along(other, direction),
-                            );
+                            let [near, far] = [particle, other].map(|end| self.along(end, direction));
+                            block.add(-scale, &near, &far);
                         }
                     }
                 }
@@ -90,6 +92,12 @@ impl Galerkin<'_> {
         blocks
     }
 
+    /// Displacement of a particle along `direction` by each rigid motion of its cluster.
+    #[inline(always)]
+    fn along(&self, particle: usize, direction: DVec3) -> [f64; MODES] {
+        modes(self.motions.along(particle, Quad::new(direction)))
+    }
+
     /// Adds a spring within a cluster, listed at `particle`.
     #[inline(always)]
     fn add_inside(&self, particle: usize, record: &Record, block: &mut Block) {
@@ -97,13 +105,13 @@ impl Galerkin<'_> {
         let filters = ends.map(|end| self.motions.filters.at(end));
         let held = ends.map(|end| self.system.held[end]);
         if held == [false; 2] && filters == [None; 2] {
-            let [here, there] = ends.map(|end| to_f64(self.motions.offset_from_centroid[end]));
+            let [here, there] = ends.map(|end| self.motions.offset(end).xyz());
             block.add_turn(record.alpha(), record.along(), here - there);
             return;
         }
         for (scale, direction) in directions(record) {
             let [here, there] =
-                ends.map(|end| if self.system.held[end] { [0.0; MODES] } else { self.motions.along(end, direction) });
+                ends.map(|end| if self.system.held[end] { [0.0; MODES] } else { self.along(end, direction) });
             let apart = std::array::from_fn(|mode| here[mode] - there[mode]);
             block.add(scale, &apart, &apart);
         }
@@ -136,12 +144,10 @@ impl Galerkin<'_> {
         let Self { body, system, motions } = self;
         let mut couplings: Vec<Coupling> = Vec::new();
         let home = |particle: usize| body.layout.cluster[particle] as usize;
-        let particles = rows.particles(row);
+        let mut entries = rows.entries(row).peekable();
+        let first = entries.peek().map(|entry| home(entry.0));
         let free = |particle: usize| !system.held[particle] && motions.filters.at(particle).is_none();
-        if particles
-            .iter()
-            .all(|particle| home(*particle as usize) == home(particles[0] as usize) && free(*particle as usize))
-        {
+        if entries.all(|(particle, _)| Some(home(particle)) == first && free(particle)) {
             return couplings;
         }
         for (particle, g) in rows.entries(row).filter(|(particle, _)| !system.held[*particle]) {
@@ -150,17 +156,22 @@ impl Galerkin<'_> {
                 couplings.push(Coupling { cluster, along: [0.0; MODES] });
                 couplings.len() - 1
             });
-            couplings[at].along.iter_mut().zip(self.motions.along(particle, g)).for_each(|(sum, along)| *sum += along);
+            couplings[at].along.iter_mut().zip(self.along(particle, g)).for_each(|(sum, along)| *sum += along);
         }
         couplings
     }
+}
+
+kernel! {
+    /// [`Galerkin::band_body`].
+    fn band(matrix: &Galerkin<'_>, first: usize, cluster: usize) -> Vec<Block> = Galerkin::band_body;
 }
 
 /// The number of transient terms that the matrix has, and for each cluster the first one it is coupled to by them.
 pub(super) fn envelope(layout: &Layout, system: &System) -> (usize, Vec<u32>) {
     let joined = |rows: usize| {
         let mut first = layout.first.clone();
-        (0..rows).for_each(|row| layout.join(&mut first, system.transient.particles(row)));
+        (0..rows).for_each(|row| layout.join(&mut first, system.transient.entries(row).map(|entry| entry.0)));
         let widths = first.iter().enumerate().map(|(cluster, first)| (cluster + 1 - *first as usize) as f64);
         (widths.map(|width| width * width).sum::<f64>(), (rows, first))
     };

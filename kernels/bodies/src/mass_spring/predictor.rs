@@ -5,6 +5,7 @@
 //! prediction affects only the initial guess, not the equations.
 
 use super::body::SoftBody;
+use numerics::quad::Quad;
 use numerics::rotation::CayleyRotation;
 use numerics::vector::{DMat3, DVec3};
 use std::ops::Range;
@@ -75,6 +76,22 @@ impl RigidMotion {
     pub(super) fn force(&self, body: &SoftBody) -> f64 {
         let mass = body.mass_of(self.particles.clone());
         (mass * (mass * self.linear_velocity.norm_squared() + 2.0 * self.energy)).sqrt()
+    }
+
+    /// The force, and the torque ÷ radius of gyration, that are the sum of forces `r` on its particles at `x`; 0 if it is held.
+    pub(super) fn force_left(&self, x: &[DVec3], r: &[Quad]) -> f64 {
+        let (mut force, mut torque) = (Quad::default(), Quad::default());
+        let centroid = Quad::new(self.centroid);
+        for (x, r) in x[self.particles.clone()].iter().zip(&r[self.particles.clone()]) {
+            force += *r;
+            torque += (Quad::new(*x) - centroid).cross(*r);
+        }
+        let (force, torque) = (force.xyz(), torque.xyz());
+        if self.inverse_mass > 0.0 {
+            (force.norm_squared() + torque.dot(&(self.inverse_inertia * torque)) / self.inverse_mass).sqrt()
+        } else {
+            0.0
+        }
     }
 
     /// Speed along `normal` that an impulse of 1 N·s along it at `point` gives that point, 1/kg.

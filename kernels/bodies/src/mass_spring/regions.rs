@@ -11,6 +11,8 @@ use crate::tets::oriented_boundary;
 use numerics::cluster_order::split;
 use numerics::partition::Partition;
 use numerics::pieces::pieces;
+use numerics::quad::Quad;
+use numerics::simd::{Path, kernel};
 use numerics::vector::DVec3;
 
 /// Tetrahedra in a region, about eight cells of six. With 160 a frame costs a tenth less and a pressed block bulges
@@ -104,30 +106,47 @@ impl Regions {
         &self.particles[self.starts[region] as usize..self.starts[region + 1] as usize]
     }
 
-    /// Volume of a region with particles at `x`, and its gradient with respect to each boundary particle, m².
-    pub(super) fn measure(&self, region: usize, x: &[DVec3], gradient: &mut [DVec3]) -> f64 {
-        let corners = self.of(region);
-        gradient.fill(DVec3::zeros());
-        let Some(first) = corners.first() else { return 0.0 };
-        for [a, b, c] in &self.faces[self.face_starts[region] as usize..self.face_starts[region + 1] as usize] {
-            let [a, b, c] = [usize::from(*a), usize::from(*b), usize::from(*c)];
-            let at = x[corners[a] as usize];
-            let twice_area = (x[corners[b] as usize] - at).cross(&(x[corners[c] as usize] - at));
-            gradient[a] += twice_area;
-            gradient[b] += twice_area;
-            gradient[c] += twice_area;
-        }
-        // The area vectors around a corner of a closed surface sum to six times the gradient. As the volume is
-        // homogeneous of degree 3, it is a third of Σ x·gradient, taken relative to a nearby origin to avoid
-        // cancellation.
-        let origin = x[*first as usize];
-        let mut volume = 0.0;
-        for (part, corner) in gradient.iter_mut().zip(corners) {
-            *part /= 6.0;
-            volume += part.dot(&(x[*corner as usize] - origin));
-        }
-        volume / 3.0
+    /// Volume of a region with particles at `x`, and its gradient with respect to each boundary particle, m². `corners` is a
+    /// buffer.
+    pub(super) fn measure(
+        &self,
+        region: usize,
+        x: &[DVec3],
+        corners: &mut Vec<[Quad; 2]>,
+        gradient: &mut [DVec3],
+    ) -> f64 {
+        let faces = &self.faces[self.face_starts[region] as usize..self.face_starts[region + 1] as usize];
+        corners.clear();
+        corners.extend(self.of(region).iter().map(|corner| [Quad::new(x[*corner as usize]), Quad::default()]));
+        measure(Path::chosen(), faces, corners, gradient)
     }
+}
+
+kernel! {
+    /// Volume within `faces` between `corners`, which are positions and zeros, and its gradient with respect to these.
+    fn measure(faces: &[[u16; 3]], corners: &mut [[Quad; 2]], gradient: &mut [DVec3]) -> f64 = measure_body;
+}
+
+#[inline(always)]
+fn measure_body(faces: &[[u16; 3]], corners: &mut [[Quad; 2]], gradient: &mut [DVec3]) -> f64 {
+    for face in faces {
+        let [a, b, c] = face.map(usize::from);
+        let at = corners[a][0];
+        let twice_area = (corners[b][0] - at).cross(corners[c][0] - at);
+        corners[a][1] += twice_area;
+        corners[b][1] += twice_area;
+        corners[c][1] += twice_area;
+    }
+    // The area vectors around a corner of a closed surface sum to six times the gradient. As the volume is
+    // homogeneous of degree 3, it is a third of Σ x·gradient, taken relative to a nearby origin to avoid
+    // cancellation.
+    let origin = corners.first().map_or(Quad::default(), |first| first[0]);
+    let mut volume = 0.0;
+    for (part, [at, areas]) in gradient.iter_mut().zip(corners) {
+        *part = areas.xyz() / 6.0;
+        volume += part.dot(&(*at - origin).xyz());
+    }
+    volume / 3.0
 }
 
 /// Recursive median splits along the longest side, as for clusters of particles.
@@ -162,7 +181,7 @@ mod tests {
         assert_eq!(regions.len(), 1);
         let far: Vec<DVec3> = points.iter().map(|p| p * 2.0 + DVec3::new(1e4, -1e4, 1e4)).collect();
         let mut gradient = vec![DVec3::zeros(); 8];
-        assert!((regions.measure(0, &far, &mut gradient) - 8.0).abs() < 1e-9);
+        assert!((regions.measure(0, &far, &mut Vec::new(), &mut gradient) - 8.0).abs() < 1e-9);
         // Six of the twelve triangles, each of area 2, lie on the three faces at the corner where all diagonals
         // start.
         assert!((gradient[0] - DVec3::repeat(-4.0 / 3.0)).norm() < 1e-9, "{}", gradient[0]);
@@ -189,10 +208,10 @@ mod tests {
         let mut points = corners.map(DVec3::from);
         let regions = Regions::new(&points, &[[0, 1, 2, 3], [0, 1, 2, 4]]);
         let mut gradient = [DVec3::zeros(); 5];
-        assert!((regions.measure(0, &points, &mut gradient) - 0.5).abs() < 1e-15);
+        assert!((regions.measure(0, &points, &mut Vec::new(), &mut gradient) - 0.5).abs() < 1e-15);
         let mut moved = |point: usize, axis: usize, by: f64| {
             points[point][axis] += by;
-            let volume = regions.measure(0, &points, &mut [DVec3::zeros(); 5]);
+            let volume = regions.measure(0, &points, &mut Vec::new(), &mut [DVec3::zeros(); 5]);
             points[point][axis] -= by;
             volume
         };

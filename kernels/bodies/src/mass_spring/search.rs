@@ -7,6 +7,7 @@ use super::contact::ContactConstraint;
 use super::friction::LoadBalance;
 use super::springs;
 use super::stage::{BodySolver, CG_SHARE, CG_SHARE_PRECISE, FrameContext, Solved, Stage};
+use numerics::simd::Path;
 use numerics::vector::{DVec2, DVec3};
 
 /// Final ÷ initial residual.
@@ -125,7 +126,7 @@ impl BodySolver {
             };
             self.store_noncontact_residual(stage);
             self.use_linearised_forces(stage);
-            if !self.direction(stage, asked, balance.is_near(), x, &mut solved) {
+            if !self.direction(stage, asked, Some(&balance), x, &mut solved) {
                 self.watch_thin(context, x);
                 break;
             }
@@ -197,15 +198,14 @@ impl BodySolver {
         let (v, links) = (&self.v, &self.links);
         let clusters = &body.order.clusters;
         let sums = clusters.sum((), |cluster, ()| {
-            clusters.range(cluster).fold(DVec2::zeros(), |sum, particle| {
-                let springs = springs::energy_at(body.adjacency.of(particle, links), x, particle);
-                if external.held[particle] {
-                    return sum + DVec2::new(springs, 0.0);
-                }
+            let particles = clusters.range(cluster);
+            let springs = springs::potential(Path::chosen(), &body.adjacency, links, x, particles.clone());
+            let free = particles.filter(|particle| !external.held[*particle]);
+            free.fold(DVec2::new(springs, 0.0), |sum, particle| {
                 let mass = body.mass[particle];
                 let energy = external.energy(particle, mass, &stage.now, a, x[particle], v[particle]);
                 let inertial = 0.5 * mass * (x[particle] - stage.y[particle]).norm_squared();
-                DVec2::new(sum.x + springs + energy, sum.y + inertial)
+                DVec2::new(sum.x + energy, sum.y + inertial)
             })
         });
         let (own, inertial) = (sums.x, sums.y);

@@ -12,8 +12,9 @@ use numerics::adjacency::{Adjacency, Incident};
 use numerics::partition::RaggedSlice;
 use numerics::quad::Quad;
 use numerics::random::Key;
-use numerics::simd::{Path, kernel};
+use numerics::simd::kernel;
 use numerics::vector::DVec3;
+use std::ops::Range;
 
 /// Springs that are linearised together.
 const LANES: usize = 8;
@@ -43,11 +44,6 @@ impl RestLengths<'_> {
 }
 
 impl Record {
-    #[inline(always)]
-    fn new(other: u32, alpha: f64, w: DVec3) -> Self {
-        Self { stiffness: [w.x, w.y, w.z, alpha].map(|x| x as f32), other }
-    }
-
     #[inline(always)]
     pub(super) fn alpha(&self) -> f64 {
         f64::from(self.stiffness[3])
@@ -133,18 +129,10 @@ pub(super) fn particle_stiffness(body: &SoftBody, rest: &RestLengths<'_>, out: &
     });
 }
 
-/// The direction of a spring from its other end, a unit vector, and its length.
+/// Whether a squared length has not lost precision, and is not zero.
 #[inline(always)]
-fn seen(link: &Link, particle: usize, x: &[DVec3]) -> (DVec3, f64) {
-    let d = x[particle] - x[link.other as usize];
-    let squared = d.norm_squared();
-    // Outside this range the square has lost precision, or the length is zero.
-    if squared > 1e-280 && squared < 1e280 {
-        let length = squared.sqrt();
-        (d * (1.0 / length), length)
-    } else {
-        degenerate_direction(d, link.spring, particle < link.other as usize)
-    }
+fn is_sound(squared: f64) -> bool {
+    squared > 1e-280 && squared < 1e280
 }
 
 /// Direction and length where the squared distance under- or overflows. For coinciding ends the direction is
@@ -169,10 +157,23 @@ impl Link {
         f64::from(self.k) * (length - self.rest)
     }
 
-    /// [`Pulls`] where the squared length under- or overflows.
+    /// The force on the other end, newtons.
+    #[inline(always)]
+    fn force(&self, x: &[DVec3], particle: usize) -> DVec3 {
+        let d = x[particle] - x[self.other as usize];
+        let squared = d.norm_squared();
+        if is_sound(squared) {
+            let length = squared.sqrt();
+            return d * (self.tension(length) * (1.0 / length));
+        }
+        let (direction, length) = degenerate_direction(d, self.spring, particle < self.other as usize);
+        direction * self.tension(length)
+    }
+
+    /// The force on the other end, and α and w of H, where the squared length under- or overflows.
     #[cold]
-    fn degenerate_pull(&self, x: &[DVec3], a: f64, particle: usize) -> (DVec3, f64, DVec3) {
-        let (direction, length) = seen(self, particle, x);
+    fn degenerate_pull(&self, d: DVec3, a: f64, first: bool) -> (Quad, f64, Quad) {
+        let (direction, length) = degenerate_direction(d, self.spring, first);
         let k = (a * a * f64::from(self.k)).min(MOST_STIFFNESS);
         let alpha = if length > 0.0 {
             k * (1.0 - self.rest * (1.0 / length)).max(0.0)
@@ -181,71 +182,46 @@ impl Link {
         } else {
             k
         };
+        let direction = Quad::new(direction);
         (direction * self.tension(length), alpha, direction * (k - alpha).max(0.0).sqrt())
     }
 }
 
-/// Springs seen from one end, eight at a time: at first the offset from the other end, K and R, then the results.
+/// Springs, eight at a time.
 #[derive(Clone, Copy)]
-struct Pulls {
-    offset: [[f64; LANES]; 3],
+struct Lanes {
+    /// Squared lengths, K and R.
+    squared: [f64; LANES],
     k: [f64; LANES],
     rest: [f64; LANES],
-    /// Force along the spring, newtons.
-    pull: [[f64; LANES]; 3],
-    /// α and w of H.
+    /// Tension ÷ length, α of H, and |w| ÷ length.
+    pull: [f64; LANES],
     alpha: [f64; LANES],
-    w: [[f64; LANES]; 3],
-    /// Whether the squared length has not lost precision.
-    sound: [bool; LANES],
+    w: [f64; LANES],
 }
 
-impl Pulls {
+impl Lanes {
     /// Springs of length 1 without stiffness.
     const NONE: Self = Self {
-        offset: [[1.0; LANES], [0.0; LANES], [0.0; LANES]],
+        squared: [1.0; LANES],
         k: [0.0; LANES],
         rest: [0.0; LANES],
-        pull: [[0.0; LANES]; 3],
+        pull: [0.0; LANES],
         alpha: [0.0; LANES],
-        w: [[0.0; LANES]; 3],
-        sound: [true; LANES],
+        w: [0.0; LANES],
     };
 
-    fn set(&mut self, lane: usize, link: &Link, offset: DVec3) {
-        (0..3).for_each(|axis| self.offset[axis][lane] = offset[axis]);
-        (self.k[lane], self.rest[lane]) = (f64::from(link.k), link.rest);
-    }
-
-    #[inline(always)]
-    fn at(&self, lane: usize) -> (DVec3, f64, DVec3) {
-        let [pull, w] = [&self.pull, &self.w].map(|v| DVec3::new(v[0][lane], v[1][lane], v[2][lane]));
-        (pull, self.alpha[lane], w)
-    }
-}
-
-kernel! {
     /// Computes forces and H for a stage of `a`.
-    fn compute_pulls(pulls: &mut [Pulls], a: f64) = compute_pulls_body;
-}
-
-#[inline(always)]
-fn compute_pulls_body(pulls: &mut [Pulls], a: f64) {
-    for pulls in pulls {
-        let Pulls { offset: [x, y, z], k, rest, pull, alpha, w, sound } = pulls;
+    #[inline(always)]
+    fn linearise(&mut self, a: f64) {
+        let Self { squared, k, rest, pull, alpha, w } = self;
         for i in 0..LANES {
-            let squared = x[i] * x[i] + y[i] * y[i] + z[i] * z[i];
-            sound[i] = squared > 1e-280 && squared < 1e280;
-            let length = squared.sqrt();
+            let length = squared[i].sqrt();
             let inverse = 1.0 / length;
-            let direction = [x[i] * inverse, y[i] * inverse, z[i] * inverse];
-            let tension = k[i] * (length - rest[i]);
             let stiff = (a * a * k[i]).min(MOST_STIFFNESS);
             alpha[i] = stiff * (1.0 - rest[i] * inverse).max(0.0);
-            let root = (stiff - alpha[i]).max(0.0).sqrt();
-            (pull[0][i], pull[1][i], pull[2][i]) =
-                (direction[0] * tension, direction[1] * tension, direction[2] * tension);
-            (w[0][i], w[1][i], w[2][i]) = (direction[0] * root, direction[1] * root, direction[2] * root);
+            pull[i] = k[i] * (length - rest[i]) * inverse;
+            w[i] = (stiff - alpha[i]).max(0.0).sqrt() * inverse;
         }
     }
 }
@@ -254,17 +230,13 @@ fn compute_pulls_body(pulls: &mut [Pulls], a: f64) {
 /// The sum of a particle is complete once it and all earlier ones of the cluster have been processed.
 #[inline(always)]
 pub(super) fn pull([inside, across]: [&[Link]; 2], x: &[DVec3], particle: usize, first: usize, forces: &mut [DVec3]) {
-    let force = |link: &Link| {
-        let (direction, length) = seen(link, particle, x);
-        direction * link.tension(length)
-    };
     let mut sum = forces[particle - first];
     for link in inside {
-        let force = force(link);
+        let force = link.force(x, particle);
         sum -= force;
         forces[link.other as usize - first] += force;
     }
-    across.iter().for_each(|link| sum -= force(link));
+    across.iter().for_each(|link| sum -= link.force(x, particle));
     forces[particle - first] = sum;
 }
 
@@ -279,57 +251,106 @@ pub(super) struct Sums {
     pub(super) block: [f64; 6],
 }
 
-impl Sums {
-    /// Adds the force and H of a spring.
+/// The force on the other end of a spring, with α of H in the fourth lane, and the products of w with itself: xx, xy, xz and
+/// yy, yz, zz. Sums of these.
+#[derive(Clone, Copy, Default)]
+struct Pull([Quad; 3]);
+
+impl Pull {
     #[inline(always)]
-    fn add(&mut self, pull: DVec3, h: [f64; 6]) {
-        self.pull += pull;
-        self.block.iter_mut().zip(h).for_each(|(sum, h)| *sum += h);
+    fn new(pull: Quad, alpha: f64, w: Quad) -> Self {
+        let [first, second] = [[0, 0, 0, 0], [1, 1, 2, 2]].map(|lanes| w.permuted(lanes));
+        Self([pull.with_fourth(alpha), w * first, w.permuted([1, 2, 2, 2]) * second])
+    }
+
+    /// As the spring acts on this end.
+    #[inline(always)]
+    fn reversed(self) -> Self {
+        let [pull, first, second] = self.0;
+        Self([(pull * -1.0).with_fourth(pull.fourth()), first, second])
+    }
+
+    #[inline(always)]
+    fn add(&mut self, other: &Self) {
+        self.0.iter_mut().zip(other.0).for_each(|(sum, other)| *sum += other);
+    }
+
+    fn sums(self) -> Sums {
+        let [pull, first, second] = self.0;
+        let (alpha, first, second) = (pull.fourth(), first.xyz(), second.xyz());
+        let block = [first.x + alpha, first.y, first.z, second.x + alpha, second.y, second.z + alpha];
+        Sums { pull: pull.xyz(), block, ..Sums::default() }
     }
 }
 
-/// Sets `sums` to those of the springs of a cluster's `particles` at `x`, and sets the `records` of these springs, for a
-/// stage of `a`.
-pub(super) fn linearise(
-    adjacency: &Adjacency,
-    links: &[Link],
+kernel! {
+    /// Sets `sums` to those of the springs of a cluster's `particles` at `x`, and sets the `records` of these springs, for a
+    /// stage of `a`.
+    pub(super) fn linearise(
+        springs: (&Adjacency, &[Link]),
+        records: RaggedSlice<'_, Record>,
+        x: &[DVec3],
+        a: f64,
+        particles: Range<usize>,
+        sums: &mut [Sums],
+    ) = linearise_body;
+}
+
+#[inline(always)]
+fn linearise_body(
+    (adjacency, links): (&Adjacency, &[Link]),
     mut records: RaggedSlice<'_, Record>,
     x: &[DVec3],
     a: f64,
-    particles: std::ops::Range<usize>,
+    particles: Range<usize>,
     sums: &mut [Sums],
 ) {
     let first = particles.start;
-    let begin = adjacency.starts[first] as usize;
-    let count = adjacency.starts[particles.end] as usize - begin;
-    let mut pulls = vec![Pulls::NONE; count.div_ceil(LANES)];
+    let [begin, end] = [first, particles.end].map(|particle| adjacency.starts[particle] as usize);
+    let mut lanes = vec![Lanes::NONE; (end - begin).div_ceil(LANES)];
     let mut at = 0;
-    for particle in particles.clone() {
-        for link in adjacency.of(particle, links).into_iter().flatten() {
-            pulls[at / LANES].set(at % LANES, link, x[particle] - x[link.other as usize]);
+    for (particle, [inside, across]) in particles.clone().zip(adjacency.each(particles.clone(), links)) {
+        let own = x[particle];
+        for link in inside.iter().chain(across) {
+            let (lanes, lane) = (&mut lanes[at / LANES], at % LANES);
+            lanes.squared[lane] = (own - x[link.other as usize]).norm_squared();
+            (lanes.k[lane], lanes.rest[lane]) = (f64::from(link.k), link.rest);
             at += 1;
         }
     }
-    compute_pulls(Path::chosen(), &mut pulls, a);
-    sums.fill(Sums::default());
+    lanes.iter_mut().for_each(|lanes| lanes.linearise(a));
+    let mut pulls = vec![Pull::default(); sums.len()];
     at = 0;
-    for (particle, records) in particles.zip(records.iter_mut()) {
-        let [inside, across] = adjacency.of(particle, links);
-        let mut sum = sums[particle - first];
-        for (index, (link, record)) in inside.iter().chain(across).zip(records).enumerate() {
-            let pulls = &pulls[at / LANES];
-            let (pull, alpha, w) =
-                if pulls.sound[at % LANES] { pulls.at(at % LANES) } else { link.degenerate_pull(x, a, particle) };
+    for ((particle, [inside, across]), records) in
+        particles.clone().zip(adjacency.each(particles, links)).zip(records.iter_mut())
+    {
+        let own = x[particle];
+        let mut pull = |link: &Link, record: &mut Record| {
+            let (lanes, lane) = (&lanes[at / LANES], at % LANES);
             at += 1;
-            *record = Record::new(link.other, alpha, w);
-            let h = [alpha + w.x * w.x, w.x * w.y, w.x * w.z, alpha + w.y * w.y, w.y * w.z, alpha + w.z * w.z];
-            sum.add(-pull, h);
-            if index < inside.len() {
-                sums[link.other as usize - first].add(pull, h);
-            }
+            let d = own - x[link.other as usize];
+            let (pull, alpha, w) = if is_sound(lanes.squared[lane]) {
+                let d = Quad::new(d);
+                (d * lanes.pull[lane], lanes.alpha[lane], d * lanes.w[lane])
+            } else {
+                link.degenerate_pull(d, a, particle < link.other as usize)
+            };
+            *record = Record { stiffness: w.with_fourth(alpha).narrowed(), other: link.other };
+            Pull::new(pull, alpha, w)
+        };
+        let mut sum = pulls[particle - first];
+        let (records_inside, records_across) = records.split_at_mut(inside.len());
+        for (link, record) in inside.iter().zip(records_inside) {
+            let pull = pull(link, record);
+            sum.add(&pull.reversed());
+            pulls[link.other as usize - first].add(&pull);
         }
-        sums[particle - first] = sum;
+        for (link, record) in across.iter().zip(records_across) {
+            sum.add(&pull(link, record).reversed());
+        }
+        pulls[particle - first] = sum;
     }
+    sums.iter_mut().zip(pulls).for_each(|(sums, pull)| *sums = pull.sums());
 }
 
 /// Elastic energy of spring `at`, joules.
@@ -357,7 +378,7 @@ pub(super) fn spring_length(body: &SoftBody, x: &[DVec3], at: usize) -> f64 {
 pub(super) fn distance(x: &[DVec3], a: usize, b: usize) -> f64 {
     let d = x[a] - x[b];
     let squared = d.norm_squared();
-    if squared > 1e-280 && squared < 1e280 { squared.sqrt() } else { degenerate_direction(d, 0, true).1 }
+    if is_sound(squared) { squared.sqrt() } else { degenerate_direction(d, 0, true).1 }
 }
 
 /// Distance between two particles, metres, and its rate of change, m/s.
@@ -368,13 +389,29 @@ pub(super) fn drift(x: &[DVec3], v: &[DVec3], a: usize, b: usize) -> [f64; 2] {
     [length, rate]
 }
 
-/// Potential within a stage of the springs listed at `particle`, each counted once, and of their dashpots, joules.
+kernel! {
+    /// Potential within a stage of the springs listed at `particles`, each counted once, and of their dashpots, joules.
+    pub(super) fn potential(
+        adjacency: &Adjacency,
+        links: &[Link],
+        x: &[DVec3],
+        particles: Range<usize>,
+    ) -> f64 = potential_body;
+}
+
 #[inline(always)]
-pub(super) fn energy_at([inside, across]: [&[Link]; 2], x: &[DVec3], particle: usize) -> f64 {
-    let energy = |link: &Link| {
-        let strain = distance(x, particle, link.other as usize) - link.rest;
-        f64::from(link.k) * strain * strain
-    };
-    let across = across.iter().filter(|link| particle < link.other as usize);
-    0.5 * (inside.iter().map(energy).sum::<f64>() + across.map(energy).sum::<f64>())
+fn potential_body(adjacency: &Adjacency, links: &[Link], x: &[DVec3], particles: Range<usize>) -> f64 {
+    let mut sum = 0.0;
+    for (particle, [inside, across]) in particles.clone().zip(adjacency.each(particles, links)) {
+        let own = x[particle];
+        let energy = |link: &Link| {
+            let squared = (own - x[link.other as usize]).norm_squared();
+            let length = if is_sound(squared) { squared.sqrt() } else { distance(x, particle, link.other as usize) };
+            let strain = length - link.rest;
+            f64::from(link.k) * strain * strain
+        };
+        let across = across.iter().filter(|link| particle < link.other as usize);
+        sum += inside.iter().map(energy).sum::<f64>() + across.map(energy).sum::<f64>();
+    }
+    0.5 * sum
 }

@@ -10,12 +10,14 @@ use super::coarse::{self, ClusterMotions, ContactFilters};
 use super::conjugate_gradients::{Coarse, Limits, Reached};
 use super::contact::{ContactConstraint, ContactState};
 use super::external::{ExternalForces, Moment};
+use super::friction::LoadBalance;
 use super::galerkin::Galerkin;
 use super::springs::{self, Link, Record, RestLengths, Sums};
 use super::state::CachedCoarseFactor;
 use super::system::System;
 use super::volume::{Inventory, ThinTet, Volumes};
-use numerics::vector::{DVec3, Vec3};
+use numerics::quad::Quad;
+use numerics::vector::DVec3;
 
 /// Tolerance of linear solves, relative to the residual.
 pub(super) const CG_SHARE: f64 = 0.1;
@@ -25,6 +27,8 @@ pub(super) const CG_SHARE_PRECISE: f64 = 0.02;
 /// Noise in the rotation of free pieces that a linear solve may leave, as a fraction of their rotational energy: it
 /// would slow them down.
 const NOISE: f64 = 1e-8;
+/// Tolerance of linear solves that are to be precise, once bodies as wholes are in balance.
+const LOOSE: f64 = 0.3;
 /// Largest number of iterations of a linear solve.
 const CG_CAP: u32 = 300;
 /// A direction that moves no particle by more than this share of the size of the bodies is not seen.
@@ -144,7 +148,7 @@ pub struct BodySolver {
     /// Lengths of springs at the start of the step, and as last measured; of torn ones any. Metres.
     pub(super) lengths: Vec<f64>,
     pub(super) lengths_now: Vec<f64>,
-    pub(super) offset_from_centroid: Vec<Vec3>,
+    pub(super) offset_from_centroid: Vec<[f32; 4]>,
     /// Springs of the current stage.
     pub(super) links: Vec<Link>,
     /// Whether each particle is of a heap; empty if none is.
@@ -227,7 +231,7 @@ impl BodySolver {
                 solved.first = before;
             }
             let asked = if stage.contacts.is_empty() { CG_SHARE } else { CG_SHARE_PRECISE };
-            if !self.direction(stage, asked, false, x, &mut solved) {
+            if !self.direction(stage, asked, None, x, &mut solved) {
                 break;
             }
             let predicted = std::mem::take(&mut self.r);
@@ -288,7 +292,7 @@ impl BodySolver {
             return (coarse.precondition(&self.system, &r), 0);
         }
         let mut out = vec![DVec3::zeros(); r.len()];
-        let limits = Limits { share: CG_SHARE, square: f64::INFINITY, cap: CG_CAP };
+        let limits = Limits::of(CG_SHARE, CG_CAP);
         let reached = coarse.solve(&mut self.system, limits, &mut out, &mut r);
         (out, reached.iterations)
     }
@@ -300,12 +304,13 @@ impl BodySolver {
     }
 
     /// Computes the Newton direction `dx` at `x` until the residual `r` of the linear system has fallen to the share that is
-    /// `asked`, and again with the contacts that it closes if it `closes` any. Returns false if the direction is not finite.
+    /// `asked`, and again with the contacts that it closes if bodies are near `balance`. What is asked to be precise also ends
+    /// once bodies as wholes are in balance. Returns false if the direction is not finite.
     pub(super) fn direction(
         &mut self,
         stage: &Stage<'_>,
         asked: f64,
-        closes: bool,
+        balance: Option<&LoadBalance>,
         x: &[DVec3],
         solved: &mut Solved,
     ) -> bool {
@@ -328,13 +333,17 @@ impl BodySolver {
         let square =
             if rotational_energy > 0.0 { 2.0 * stage.a * stage.a * NOISE * rotational_energy } else { f64::INFINITY };
         let searching = !stage.contacts.is_empty() && stage.line_search;
-        let first = self.gradients(body, Limits { share: asked, square, cap: bound }, solved);
+        let precise = balance.filter(|_| asked == CG_SHARE_PRECISE);
+        let holds = |r: &[Quad]| precise.is_some_and(|balance| balance.holds(stage.a, x, r));
+        let limits = Limits { square, loose_share: LOOSE, suffices: &holds, ..Limits::of(asked, bound) };
+        let first = self.gradients(body, limits, solved);
         let mut reached = first;
-        if closes && self.close_contacts(stage, x, &mut right) {
+        if balance.is_some_and(LoadBalance::is_near) && self.close_contacts(stage, x, &mut right) {
             target = self.momentum_target(stage, &right);
             self.correct_linear_momentum(stage, &target);
-            let enough = asked * asked * first.start;
-            reached = self.gradients(body, Limits { share: 1.0, square: enough, cap: bound }, solved);
+            let share = if first.met { asked.max(first.share) } else { asked };
+            let enough = share * share * first.start;
+            reached = self.gradients(body, Limits { square: enough, ..Limits::of(1.0, bound) }, solved);
         }
         let usual = &mut self.cached.initial_iterations[stage.index];
         if *usual == 0 {
@@ -359,7 +368,7 @@ impl BodySolver {
     }
 
     /// Solves the linear system from `dx` on; with a new coarse factor if that takes more iterations than the limit.
-    fn gradients(&mut self, body: &SoftBody, limits: Limits, solved: &mut Solved) -> Reached {
+    fn gradients(&mut self, body: &SoftBody, limits: Limits<'_>, solved: &mut Solved) -> Reached {
         let mut solve = |solver: &mut Self, limits| {
             let coarse = Coarse::new(body, &solver.cached, &solver.offset_from_centroid);
             let reached = coarse.solve(&mut solver.system, limits, &mut solver.dx, &mut solver.r);
@@ -391,9 +400,8 @@ mod tests {
     use super::*;
     use crate::tets::cubes;
 
-    /// A spinning and deforming block without pins, whose angular momentum is corrected after Newton's method.
-    #[test]
-    fn the_residual_is_that_of_the_positions_returned() {
+    /// Calls `with` a stage of a spinning and deforming block without pins, and a solver for it.
+    fn with_block(line_search: bool, with: impl Fn(&Stage<'_>, &mut BodySolver, Vec<DVec3>)) {
         let h = 1.0 / 24.0;
         let (points, tets) = cubes([3, 2, 2], [0.0; 3], [0.3, 0.2, 0.2]);
         let material = Material { density: 1000.0.into(), stiffness: 1e4.into(), damping: 0.01.into() };
@@ -406,25 +414,53 @@ mod tests {
             FrameContext { body: &body, external: &external, rest, volumes: &body.volumes, cancelled: &|| false };
         let start: Vec<DVec3> = body.rest.iter().map(|x| x + DVec3::new(x.y * x.y, 0.3 * x.z, x.x * x.y)).collect();
         let inertial: Vec<DVec3> = start.iter().map(|x| x + DVec3::z().cross(x) * (5.0 * h)).collect();
+        let mut solver = BodySolver::new(&body);
+        solver.volumes = Volumes::new(&body, 1.0, &body.volumes);
+        springs::particle_stiffness(&body, &context.rest, &mut solver.particle_stiffness);
+        let volumes = solver.volumes.at(&body, &start);
+        solver.set_step_start(&context, h, |a, b| springs::distance(&start, a, b), volumes);
+        let stage = Stage { line_search, ..Stage::new(context, [&inertial, &start], h, 1.0) };
+        with(&stage, &mut solver, inertial.clone());
+    }
+
+    /// The angular momentum of the block is corrected after Newton's method.
+    #[test]
+    fn the_residual_is_that_of_the_positions_returned() {
         for line_search in [false, true] {
-            let mut solver = BodySolver::new(&body);
-            solver.volumes = Volumes::new(&body, 1.0, &body.volumes);
-            springs::particle_stiffness(&body, &context.rest, &mut solver.particle_stiffness);
-            let volumes = solver.volumes.at(&body, &start);
-            solver.set_step_start(&context, h, |a, b| springs::distance(&start, a, b), volumes);
-            let stage = Stage { line_search, ..Stage::new(context, [&inertial, &start], h, 1.0) };
-            let mut x = inertial.clone();
-            let solved = if line_search {
-                solver.descend(&stage, &mut [], f64::INFINITY, &Solved::default(), &mut x)
-            } else {
-                solver.solve(&stage, Newton { most: 1, tolerance: 0.0 }, &mut x)
-            };
-            solver.assemble(&stage, &x, false);
-            assert!(solver.corrected_angular_momentum(&stage, &x).is_some(), "nothing holds the block");
-            let residual = (solver.square(&stage) / solved.first).sqrt();
-            assert!(residual > 0.0 && !solved.failed, "{solved:?}");
-            let off = (solved.residual / residual - 1.0).abs();
-            assert!(off < 1e-9, "line search {line_search}: {} instead of {residual}", solved.residual);
+            with_block(line_search, |stage, solver, mut x| {
+                let solved = if line_search {
+                    solver.descend(stage, &mut [], f64::INFINITY, &Solved::default(), &mut x)
+                } else {
+                    solver.solve(stage, Newton { most: 1, tolerance: 0.0 }, &mut x)
+                };
+                solver.assemble(stage, &x, false);
+                assert!(solver.corrected_angular_momentum(stage, &x).is_some(), "nothing holds the block");
+                let residual = (solver.square(stage) / solved.first).sqrt();
+                assert!(residual > 0.0 && !solved.failed, "{solved:?}");
+                let off = (solved.residual / residual - 1.0).abs();
+                assert!(off < 1e-9, "line search {line_search}: {} instead of {residual}", solved.residual);
+            });
         }
+    }
+
+    /// Without loads bodies are in balance under them.
+    #[test]
+    fn a_precise_linear_solve_ends_sooner_with_bodies_in_balance() {
+        with_block(true, |stage, solver, x| {
+            let mut iterations = |asked, balance: Option<&LoadBalance>| {
+                let mut solved = Solved::default();
+                solver.begin(stage);
+                solver.assemble(stage, &x, true);
+                let before = solver.square(stage);
+                assert!(solver.direction(stage, asked, balance, &x, &mut solved));
+                (solved.cg, solver.square(stage) / before)
+            };
+            let balance = LoadBalance::default();
+            let [usual, precise, sooner] =
+                [(CG_SHARE, None), (CG_SHARE_PRECISE, None), (CG_SHARE_PRECISE, Some(&balance))]
+                    .map(|(asked, balance)| iterations(asked, balance));
+            assert!(sooner.0 < usual.0 && usual.0 < precise.0, "{sooner:?} {usual:?} {precise:?}");
+            assert_eq!(iterations(CG_SHARE, Some(&balance)), usual, "only precise ones");
+        });
     }
 }

@@ -9,7 +9,7 @@ use super::body::SoftBody;
 use super::springs::{Record, Sums};
 use numerics::adjacency::Adjacency;
 use numerics::quad::Quad;
-use numerics::rank_one::RankOneTerms;
+use numerics::rank_one::{RankOneTerms, part_of};
 use numerics::simd::{Path, kernel};
 use numerics::vector::DVec3;
 
@@ -25,6 +25,8 @@ pub(super) struct System {
     /// Contacts of single particles, xx xy xz yy yz zz; empty without any. In f64: penalties may be 1e12 times as stiff as what
     /// resists along the surface.
     pub(super) blocks: Vec<[f64; 6]>,
+    /// Particles that have such contacts, ascending.
+    pub(super) in_contact: Vec<u32>,
     /// Pinned particles.
     pub(super) held: Vec<bool>,
     /// Particles without intact springs.
@@ -85,43 +87,36 @@ fn apply_in_cluster_body(
 ) -> f64 {
     let first = particles.start;
     out.fill(Quad::default());
+    let (mine, inertia) = (&p[particles.clone()], &system.inertia[particles.clone()]);
     // One loop for each kind of term: beside single components the compiler would not keep vectors in registers.
-    for particle in particles.clone() {
-        let mine = p[particle];
-        let mut total = out[particle - first] + mine * system.inertia[particle];
-        let [inside, across] = adjacency.of(particle, &system.records);
+    let springs = adjacency.each(particles.clone(), &system.records);
+    for (index, ((mine, inertia), [inside, across])) in mine.iter().zip(inertia).zip(springs).enumerate() {
+        let mut total = out[index] + *mine * *inertia;
         for record in inside {
             let other = record.other as usize;
-            let force = record.times(mine - p[other]);
+            let force = record.times(*mine - p[other]);
             total += force;
             out[other - first] -= force;
         }
         for record in across {
-            total += record.times(mine - p[record.other as usize]);
+            total += record.times(*mine - p[record.other as usize]);
         }
-        out[particle - first] = total;
+        out[index] = total;
     }
-    if !system.blocks.is_empty() {
-        for particle in particles.clone() {
-            let block = &system.blocks[particle];
-            if *block != [0.0; 6] {
-                out[particle - first] += Quad::new(times(block, p[particle].xyz()));
-            }
-        }
+    for particle in part_of(&system.in_contact, particles.clone()).iter().map(|particle| *particle as usize) {
+        out[particle - first] += Quad::new(times(&system.blocks[particle], p[particle].xyz()));
     }
     for terms in [&system.regions, &system.transient] {
-        if !terms.is_empty() {
-            for particle in particles.clone() {
-                out[particle - first] += terms.push(particle);
-            }
+        for particle in terms.members(particles.clone()).iter().map(|particle| *particle as usize) {
+            out[particle - first] += terms.push(particle);
         }
     }
     let mut sum = 0.0;
-    for (particle, out) in particles.zip(out) {
-        if system.held[particle] {
+    for ((mine, held), out) in mine.iter().zip(&system.held[particles]).zip(out) {
+        if *held {
             *out = Quad::default();
         }
-        sum += p[particle].dot(*out);
+        sum += mine.dot(*out);
     }
     sum
 }

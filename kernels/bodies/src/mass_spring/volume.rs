@@ -9,6 +9,8 @@
 use super::body::{SoftBody, volume};
 use super::stage::FrameContext;
 use numerics::partition::{Partition, RaggedSlice};
+use numerics::quad::Quad;
+use numerics::simd::{Path, kernel};
 use numerics::vector::{DVec2, DVec3};
 
 /// Bulk modulus of the springs ÷ E: their Poisson ratio is a quarter.
@@ -145,11 +147,11 @@ impl Volumes {
         let mut out = vec![[0.0; 2]; self.before.len()];
         if let Some(partition) = &self.partition {
             partition.for_each(&mut out[..], |part, out: &mut [[f64; 2]]| {
-                let mut gradient = Vec::new();
+                let (mut corners, mut gradient) = (Vec::new(), Vec::new());
                 for (region, out) in partition.range(part).zip(out) {
                     let particles = regions.of(region);
                     gradient.resize(particles.len(), DVec3::zeros());
-                    let volume = regions.measure(region, x, &mut gradient);
+                    let volume = regions.measure(region, x, &mut corners, &mut gradient);
                     let rate = |(g, particle): (&DVec3, &u32)| v.get(*particle as usize).map_or(0.0, |v| g.dot(v));
                     *out = [volume, gradient.iter().zip(particles).map(rate).sum()];
                 }
@@ -165,10 +167,10 @@ impl Volumes {
         let gradients = RaggedSlice::new(&regions.starts, &mut self.gradients);
         let out = (&mut self.pressures[..], &mut self.changes[..], gradients);
         let sums = partition.sum(out, |part, (pressures, changes, mut gradients)| {
-            let mut sums = DVec2::zeros();
+            let (mut sums, mut corners) = (DVec2::zeros(), Vec::new());
             let regions_here = partition.range(part).zip(pressures).zip(changes).zip(gradients.iter_mut());
             for (((region, pressure), change), mine) in regions_here {
-                let volume = regions.measure(region, x, mine);
+                let volume = regions.measure(region, x, &mut corners, mine);
                 let k = stiffness[region];
                 let (push, _, energy) = stiffened(volume - rest[region], rest[region], [STIFFENING, STIFFENING_END]);
                 let (dashed, more) = (k * regions.damping[region] / a, volume - before[region]);
@@ -314,6 +316,19 @@ pub(super) fn opening([a, b, c, d]: [DVec3; 4]) -> [DVec3; 4] {
     [-(b + c + d), b, c, d]
 }
 
+kernel! {
+    /// Signed volumes of tetrahedra with particles at `x`.
+    fn tet_volumes(tets: &[[u32; 4]], x: &[DVec3], out: &mut [f64]) = tet_volumes_body;
+}
+
+#[inline(always)]
+fn tet_volumes_body(tets: &[[u32; 4]], x: &[DVec3], out: &mut [f64]) {
+    for (tet, out) in tets.iter().zip(out) {
+        let [a, b, c, d] = tet.map(|corner| Quad::new(x[corner as usize]));
+        *out = (b - a).dot((c - a).cross(d - a)) / 6.0;
+    }
+}
+
 /// State of all tetrahedra, evaluated once a step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Inventory {
@@ -329,9 +344,11 @@ impl Inventory {
     /// Evaluated at the positions `x`.
     pub(super) fn new(body: &SoftBody, x: &[DVec3], rest: &[f64]) -> Self {
         let parts = body.tet_partition.map((), |part, ()| {
+            let tets = body.tet_partition.range(part);
+            let mut volumes = vec![0.0; tets.len()];
+            tet_volumes(Path::chosen(), &body.tets[tets.clone()], x, &mut volumes);
             let (mut inverted, mut now, mut before, mut watched) = (0, 0.0, 0.0, Vec::new());
-            for tet in body.tet_partition.range(part) {
-                let volume = volume(body.tets[tet].map(|corner| x[corner as usize]));
+            for (tet, volume) in tets.zip(volumes) {
                 inverted += u32::from(volume < 0.0);
                 if volume <= WATCHED * rest[tet] {
                     watched.push(tet as u32);

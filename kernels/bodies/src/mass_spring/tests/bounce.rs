@@ -65,6 +65,27 @@ fn a_cube_bounces_as_with_256_steps_a_frame_at_half_the_cost() {
     }
 }
 
+/// What is pinned does not bounce, whichever of its particles is.
+#[test]
+fn impacts_of_pinned_bodies_take_one_step() {
+    let body = block_body([2; 3], 0.05, &material(1e3, 2e5, 0.0));
+    let impact = |pins: &[Pin]| {
+        let mut state = State::at_rest(&body);
+        state.positions.iter_mut().for_each(|x| x[1] += 0.01);
+        state.velocities.fill([0.0, -3.0, 0.0]);
+        let plane = ground(0.0);
+        let frame = SolverFrame { contacts: Some(&plane), pins, ..BARE };
+        BodySolver::new(&body).step(&body, &mut state, &frame)
+    };
+    assert!(impact(&[]).substeps > 1);
+    for particle in (0..body.len()).filter(|particle| body.rest_point(*particle)[1] > 0.09) {
+        let mut at = body.rest_point(particle);
+        at[1] += 0.01;
+        let report = impact(&[Pin { particle: particle as u32, between: [at; 2] }]);
+        assert_eq!((report.substeps, report.contacts > 0), (1, true), "{particle}");
+    }
+}
+
 #[test]
 fn bodies_leave_at_the_given_share_of_their_speed_of_approach() {
     for throw in &THROWS {
