@@ -88,7 +88,8 @@ impl<'a> Coarse<'a> {
             let curvature = system.apply(self.body, &p, &mut ap);
             reached.iterations += 1;
             if !(curvature > 0.0 && curvature.is_finite()) {
-                alpha = 0.0;
+                // No step along it, which may be infinite.
+                p.fill(Quad::default());
                 break false;
             }
             alpha = rz / curvature;
@@ -137,8 +138,8 @@ impl<'a> Coarse<'a> {
     ) {
         self.body.order.clusters.for_each((p, x), |cluster, mine: (&mut [Quad], &mut [DVec3])| {
             let particles = self.body.order.clusters.range(cluster);
-            let own = modes.get(MODES * cluster..MODES * (cluster + 1)).unwrap_or(&[0.0; MODES]);
-            let own = [&own[..3], &own[3..]].map(|own| Quad::new(DVec3::from_column_slice(own)));
+            let own = modes.get(MODES * cluster..MODES * (cluster + 1));
+            let own = own.map(|own| [&own[..3], &own[3..]].map(|own| Quad::new(DVec3::from_column_slice(own))));
             update_in_cluster(Path::chosen(), (system, &self.motions), particles, own, r, steps, mine);
         });
     }
@@ -190,7 +191,7 @@ kernel! {
     fn update_in_cluster(
         levels: (&System, &ClusterMotions<'_>),
         particles: Range<usize>,
-        own: [Quad; 2],
+        own: Option<[Quad; 2]>,
         r: &[Quad],
         steps: [f64; 2],
         mine: (&mut [Quad], &mut [DVec3]),
@@ -201,7 +202,7 @@ kernel! {
 fn update_in_cluster_body(
     (system, motions): (&System, &ClusterMotions<'_>),
     particles: Range<usize>,
-    own: [Quad; 2],
+    own: Option<[Quad; 2]>,
     r: &[Quad],
     [alpha, beta]: [f64; 2],
     (p, x): (&mut [Quad], &mut [DVec3]),
@@ -212,7 +213,8 @@ fn update_in_cluster_body(
         *x += (*p * alpha).xyz();
         if !held {
             let fine = solve_lower_transpose(smoother, solve_lower(smoother, r.xyz()));
-            *p = Quad::new(fine) + motions.moved(own, particle) + *p * beta;
+            let coarse = own.map_or(Quad::default(), |own| motions.moved(own, particle));
+            *p = Quad::new(fine) + coarse + *p * beta;
         }
     }
 }

@@ -23,6 +23,10 @@ const LEAST_BEND: f32 = 1e-3;
 /// How much larger than in the solve of a substep errors may be, of that change.
 const COARSER: f64 = 100.0;
 
+/// Cells that liquid moves in a substep, at most, for what it carries to be looked for: half of a longer way says nothing of
+/// the mean.
+const FOLLOWED: f32 = 8.0;
+
 /// Viscosity · Δt ÷ (density · cell²) above which the velocity counts as steady. Waves fade there, and viscosity holds what
 /// would fly outward.
 const THICK: f32 = 1.0;
@@ -73,7 +77,7 @@ impl Start<'_> {
     /// What the velocity changes by in the substep as the flow carries itself along and pressure holds it together, m/s, on its
     /// rows; none where that is too little.
     fn change(&self, motion: &Motion, carried: Option<&FaceFields<f32>>) -> Option<FaceFields<f32>> {
-        if !self.may_change(motion) {
+        if !self.may_change(motion, FOLLOWED) {
             return None;
         }
         let cells = self.cells();
@@ -99,7 +103,7 @@ impl Start<'_> {
     /// what it changes by. Solids count as still: their own motion is in the velocity, or an impulse that does not go on.
     pub(super) fn begin(&self, motion: &mut Motion) -> LiquidReport {
         let is_first = std::mem::take(&mut motion.is_new);
-        if !is_first || self.settings.splitting != Splitting::KeepsSpin || !self.may_change(motion) {
+        if !is_first || self.settings.splitting != Splitting::KeepsSpin || !self.may_change(motion, FARTHEST) {
             return LiquidReport::default();
         }
         let cells = self.cells();
@@ -122,10 +126,10 @@ impl Start<'_> {
     }
 
     /// Whether what the flow carries along may change it: the velocity differs by the steepest slope at most over half of
-    /// the way. What moves too far is not followed.
-    fn may_change(&self, motion: &Motion) -> bool {
+    /// the way. What moves farther than `farthest` cells is not followed.
+    fn may_change(&self, motion: &Motion, farthest: f32) -> bool {
         let way = motion.largest_speed() as f32 * self.step();
-        0.5 * STEEPEST * way > LEAST_BEND && way <= FARTHEST
+        0.5 * STEEPEST * way > LEAST_BEND && way <= farthest
     }
 
     fn cells(&self) -> LiquidCells {
