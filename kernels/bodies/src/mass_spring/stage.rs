@@ -28,7 +28,7 @@ pub(super) const CG_SHARE_PRECISE: f64 = 0.02;
 /// would slow them down.
 const NOISE: f64 = 1e-8;
 /// Tolerance of linear solves that are to be precise, once bodies as wholes are in balance.
-const LOOSE: f64 = 0.3;
+const LOOSE: f64 = 0.5;
 /// Largest number of iterations of a linear solve.
 const CG_CAP: u32 = 300;
 /// A direction that moves no particle by more than this share of the size of the bodies is not seen.
