@@ -10,7 +10,7 @@ use super::{root, sources};
 const VECTOR: &str = "numerics/src/vector.rs";
 
 /// Forms that other files have, and why they may.
-const EXEMPT: [(&str, &str, &str); 12] = [
+const EXEMPT: [(&str, &str, &str); 11] = [
     ("conformance/src/samples.rs", "|X| X * X).sum::<f32>().sqrt()", "of a quaternion"),
     ("engine/src/geometry/volume.rs", "[0, 1, 2].map(|K| A[K] - B[K])", "numbers of cells"),
     ("numerics/src/closest_point.rs", "A[0] * B[0] + A[1] * B[1] + A[2] * B[2]", "a mean of vectors"),
