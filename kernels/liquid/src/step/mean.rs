@@ -189,7 +189,8 @@ impl Start<'_> {
     }
 }
 
-/// What is carried over half of a substep, of what is carried over all of it: what keeps spin grows with the square of the time.
+/// The velocity to carry over half of a substep, where `carried` is the one for all of it. What is added to keep spin grows with the
+/// square of the time.
 fn for_half(own: &FaceFields<f32>, carried: &FaceFields<f32>) -> FaceFields<f32> {
     std::array::from_fn(|axis| {
         own[axis].iter().zip(&carried[axis]).map(|(own, carried)| own + 0.25 * (carried - own)).collect()
