@@ -50,15 +50,16 @@ impl Start<'_> {
     }
 
     /// The mean velocity of the substep, on the rows of the velocity, in which gravity adds `gained`, m/s; none where it is that
-    /// of the start. `carried`: what is carried in its place, where that is another.
+    /// of the start. `carried`: what is carried in its place, where that is another. `report` counts what it is solved for with.
     pub(super) fn mean_velocity(
         &self,
         motion: &Motion,
         carried: Option<&FaceFields<f32>>,
         gained: [f64; 3],
+        report: &mut LiquidReport,
     ) -> Option<FaceFields<f32>> {
         let falls = !motion.flying.is_empty() && gained != [0.0; 3];
-        let change = self.change(motion, carried);
+        let change = self.change(motion, carried, report);
         if change.is_none() && !falls {
             return None;
         }
@@ -76,7 +77,12 @@ impl Start<'_> {
 
     /// What the velocity changes by in the substep as the flow carries itself along and pressure holds it together, m/s, on its
     /// rows; none where that is too little.
-    fn change(&self, motion: &Motion, carried: Option<&FaceFields<f32>>) -> Option<FaceFields<f32>> {
+    fn change(
+        &self,
+        motion: &Motion,
+        carried: Option<&FaceFields<f32>>,
+        report: &mut LiquidReport,
+    ) -> Option<FaceFields<f32>> {
         if !self.may_change(motion, FOLLOWED) {
             return None;
         }
@@ -94,7 +100,7 @@ impl Start<'_> {
         let settings = LiquidSettings { tolerance: COARSER * self.settings.tolerance, ..self.settings.clone() };
         let coarse = Start { settings: &settings, ..*self };
         let projection = coarse.projection(&cells, materials, [0.0; 3], fastest);
-        projection.by_pressure(fastest, &mut [], &mut faces, &mut Guess::default());
+        report.count_solves(&projection.by_pressure(fastest, &mut [], &mut faces, &mut Guess::default()));
         Some(resampled(motion.rows(), &cells.rows, &faces))
     }
 

@@ -220,18 +220,24 @@ pub struct LiquidReport {
 }
 
 impl LiquidReport {
+    /// Counts the iterations of other solves, and whether they ended early; not the errors that they left, where the solve at
+    /// the end of the substep makes these good.
+    fn count_solves(&mut self, other: &Self) {
+        self.pressure_iterations += other.pressure_iterations;
+        self.coupled_iterations += other.coupled_iterations;
+        self.viscosity_iterations += other.viscosity_iterations;
+        self.solves_cut_short += other.solves_cut_short;
+    }
+
     fn add(&mut self, other: &Self) {
+        self.count_solves(other);
         self.substeps += other.substeps;
         self.cfl_reached = self.cfl_reached.max(other.cfl_reached);
         self.caps_hit += other.caps_hit;
-        self.pressure_iterations += other.pressure_iterations;
         self.pressure_residual = self.pressure_residual.max(other.pressure_residual);
         self.viscous_substeps += other.viscous_substeps;
-        self.coupled_iterations += other.coupled_iterations;
         self.coupled_residual = self.coupled_residual.max(other.coupled_residual);
-        self.viscosity_iterations += other.viscosity_iterations;
         self.viscosity_residual = self.viscosity_residual.max(other.viscosity_residual);
-        self.solves_cut_short += other.solves_cut_short;
         self.max_divergence = self.max_divergence.max(other.max_divergence);
         self.unbalanced = self.unbalanced.max(other.unbalanced);
         self.liquid_cells = other.liquid_cells;

@@ -165,11 +165,11 @@ pub(super) fn substep(
     let step = (seconds / settings.cell) as f32;
     let gravity = (around.gravity)(middle).map(|g| g * seconds);
     let start = Start { settings, surface, around, span };
-    let first = start.begin(motion);
+    let mut before_end = start.begin(motion);
     let periods = settings.domain.periods();
     let turned = |gain| turned::carried(motion, gain, periods, seconds, [step, STEEPEST / step]);
     let carried = motion.gain.as_ref().map(turned);
-    let mean = start.mean_velocity(motion, carried.as_ref(), gravity);
+    let mean = start.mean_velocity(motion, carried.as_ref(), gravity, &mut before_end);
     let Continued { velocity, carried, way, reach } =
         continued(&settings.domain, motion, (mean.as_ref(), carried), on_way, step);
     let flow = Moving { velocity: &velocity, step, periods, solid: on_way };
@@ -221,10 +221,7 @@ pub(super) fn substep(
     cells.images.fill_each(&mut faces);
     report.substeps = 1;
     report.cfl_reached = f64::from(way);
-    report.pressure_iterations += first.pressure_iterations;
-    report.coupled_iterations += first.coupled_iterations;
-    report.viscosity_iterations += first.viscosity_iterations;
-    report.solves_cut_short += first.solves_cut_short;
+    report.count_solves(&before_end);
     report.stored_cells = stored_cells;
     report.liquid_cells = cells.liquid.len();
     report.left_domain = left_domain;

@@ -4,18 +4,32 @@ use super::*;
 use crate::marked::MarkedSurface;
 use numerics::trig;
 
-/// A wave of `length` cells and 0.2 cells amplitude on a stream 8 cells deep that moves `way` cells a substep: its largest
-/// amplitudes in successive periods, cells.
-fn amplitudes(length: i32, way: f64, substeps: u32) -> Vec<f64> {
+/// The side of a cell, m, and the length of a substep, s.
+const CELL: f64 = 0.01;
+const SECONDS: f64 = 1.0 / 48.0;
+
+/// The box of a stream with a wave of `length` cells.
+fn channel(length: i32) -> Domain {
     let walls = [[Wall::Periodic; 2], [Wall::FreeSlip; 2], [Wall::Periodic; 2]];
-    let domain = Domain { walls, ..Domain::closed([0; 3], [length, 14, 3]) };
-    let (cell, seconds) = (0.01, 1.0 / 48.0);
+    Domain { walls, ..Domain::closed([0; 3], [length, 14, 3]) }
+}
+
+/// A wave of `length` cells and 0.2 cells amplitude on a stream 8 cells deep that moves `way` cells a substep.
+fn stream(length: i32, way: f64, max_iterations: u32) -> Liquid<MarkedSurface> {
+    let domain = channel(length);
+    let settings = LiquidSettings { cfl: 16.0, max_substeps: 1, max_iterations, ..LiquidSettings::new(domain, CELL) };
     let k = std::f32::consts::TAU / length as f32;
-    let settings = LiquidSettings { cfl: 16.0, max_substeps: 1, ..LiquidSettings::new(domain, cell) };
     let hill = move |p: Vec3| p[1] - 8.1 - 0.2 * trig::sin_cos(k * p[0]).1;
     let mut liquid = Liquid::new(settings, MarkedSurface::new(domain, 1, hill, 0, 1));
-    let speed = (way * cell / seconds) as f32;
+    let speed = (way * CELL / SECONDS) as f32;
     liquid.set_velocity(|_| [speed, 0.0, 0.0], &FALLING);
+    liquid
+}
+
+/// The largest amplitudes of its wave in successive periods, cells.
+fn amplitudes(length: i32, way: f64, substeps: u32) -> Vec<f64> {
+    let (domain, mut liquid) = (channel(length), stream(length, way, 200));
+    let k = std::f32::consts::TAU / length as f32;
     let amplitude = |liquid: &Liquid<MarkedSurface>| {
         let view = liquid.surface().view();
         let mut sums = [0.0; 2];
@@ -31,7 +45,7 @@ fn amplitudes(length: i32, way: f64, substeps: u32) -> Vec<f64> {
     };
     let mut all = vec![amplitude(&liquid)];
     for _ in 0..substeps {
-        liquid.step_frame(&FALLING, seconds);
+        liquid.step_frame(&FALLING, SECONDS);
         all.push(amplitude(&liquid));
     }
     all.chunks(8).map(|part| part.iter().copied().fold(0.0, f64::max)).collect()
@@ -51,4 +65,20 @@ fn a_stream_carries_its_waves_along() {
             }
         }
     }
+}
+
+/// The mean velocity that the surface of a stream moves with is solved for, and that counts: its iterations, and that it ends
+/// early where few are allowed.
+#[test]
+fn the_solve_for_the_mean_velocity_is_counted() {
+    let counts = |way: f64, most: u32| {
+        let mut liquid = stream(16, way, most);
+        liquid.step_frame(&FALLING, SECONDS);
+        let report = liquid.step_frame(&FALLING, SECONDS);
+        (report.solves_cut_short, report.pressure_iterations)
+    };
+    assert_eq!([counts(0.0, 1), counts(2.0, 1)], [(1, 1), (2, 2)]);
+    let (cut_short, iterations) = counts(2.0, 200);
+    assert_eq!(cut_short, 0);
+    assert!(iterations > counts(0.0, 200).1, "{iterations}");
 }
