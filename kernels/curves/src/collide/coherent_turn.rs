@@ -22,7 +22,8 @@ pub(super) struct WayOut<'a> {
 }
 
 impl Segment<'_> {
-    /// Turns with coherence. Afterwards `nearby` holds everything that the segment may cross in its new direction.
+    /// Turns with coherence; `None` where it has to turn from rest. Afterwards `nearby` holds everything that the segment may
+    /// cross in its new direction.
     #[inline(always)]
     pub(super) fn turn_coherently<'t>(
         &self,
@@ -30,7 +31,7 @@ impl Segment<'_> {
         way_out: &WayOut<'t>,
         obstacles: &[&'t TriangleTree],
         nearby: &mut Nearby<'t>,
-    ) -> Turned {
+    ) -> Option<Turned> {
         let before = match way_out.others {
             [] => Turned { direction: self.to, met: false, clear: true },
             others => self.turn(method, others, nearby),
@@ -39,9 +40,9 @@ impl Segment<'_> {
         for towards in [way_out.up, way_out.rest] {
             let Some((angle, direction)) = self.first_free(&target, &towards, obstacles, nearby) else { continue };
             let met = before.met || angle > 0.0;
-            return Turned { direction, met, clear: nearby.is_empty() };
+            return Some(Turned { direction, met, clear: nearby.is_empty() });
         }
-        self.turn(method, obstacles, nearby)
+        None
     }
 
     /// The first direction from one unit vector to another at which nothing is near, and its angle.

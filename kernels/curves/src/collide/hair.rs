@@ -230,24 +230,29 @@ impl Hair<'_> {
         nearby: &mut Nearby<'t>,
         reached: &mut Reached,
     ) -> DVec3 {
-        let mut turned = match self.half_space {
-            Some(half_space) if half_space.frees(&(to_f64(self.rest[0]) + self.shift), segment) => {
-                Turned { direction: segment.to, met: false, clear: true }
+        let root = to_f64(self.rest[0]) + self.shift;
+        let is_free = self.half_space.is_some_and(|half_space| half_space.frees(&root, segment));
+        // One call for both attempts: what is inlined here is most of the kernel, and compiled once.
+        let mut wary: Option<Segment<'_>> = None;
+        let (turned, end) = loop {
+            let turned = match &wary {
+                None if is_free => Turned { direction: segment.to, met: false, clear: true },
+                wary => turned_by(how, wary.as_ref().unwrap_or(segment), way_out, nearby),
+            };
+            let keeps_goal = wary.is_none() && !turned.met && may_keep_goal && self.out[k] == self.goal[k];
+            let end = if keeps_goal { self.goal[k + 1] } else { segment.end(&turned.direction) };
+            let start = segment.start(&turned.direction);
+            let crossing = if turned.clear { None } else { first_crossing(nearby.blocks(), start, end) };
+            if crossing.is_some() && wary.is_none() {
+                wary = Some(segment.wary());
+                continue;
             }
-            _ => turned_by(how, segment, way_out, nearby),
-        };
-        let mut end = segment.end(&turned.direction);
-        if !turned.met && may_keep_goal && self.out[k] == self.goal[k] {
-            end = self.goal[k + 1];
-        }
-        if !turned.clear && first_crossing(nearby.blocks(), segment.start(&turned.direction), end).is_some() {
-            turned = turned_by(how, &segment.wary(), way_out, nearby);
-            end = segment.end(&turned.direction);
-            if let Some(crossing) = first_crossing(nearby.blocks(), segment.start(&turned.direction), end) {
+            if let Some(crossing) = crossing {
                 reached.unfreed_segments += 1;
                 reached.deepest_overlap = reached.deepest_overlap.max(crossing.depth);
             }
-        }
+            break (turned, end);
+        };
         reached.contacts += u64::from(turned.met);
         self.out[k + 1] = end;
         turned.direction
@@ -405,10 +410,12 @@ fn turned_by<'t>(
     way_out: Option<&WayOut<'t>>,
     nearby: &mut Nearby<'t>,
 ) -> Turned {
-    match way_out {
-        None => segment.turn(how.method, how.obstacles, nearby),
-        Some(way_out) => segment.turn_coherently(how.method, way_out, how.obstacles, nearby),
+    if let Some(way_out) = way_out
+        && let Some(turned) = segment.turn_coherently(how.method, way_out, how.obstacles, nearby)
+    {
+        return turned;
     }
+    segment.turn(how.method, how.obstacles, nearby)
 }
 
 /// Spherical interpolation from one unit vector to another; through `axis` × `from` if they are opposite.

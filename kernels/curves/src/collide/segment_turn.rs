@@ -120,15 +120,16 @@ impl Segment<'_> {
         obstacles: &[&'t TriangleTree],
         nearby: &mut Nearby<'t>,
     ) -> Turned {
-        match self.sweep(method, obstacles, nearby) {
-            Sweep::Free(turned) => turned,
-            Sweep::Stuck => match self.turn_out(method, obstacles, nearby) {
-                None => Turned { direction: self.from, met: true, clear: false },
-                Some(direction) => match (Self { from: direction, ..*self }).sweep(method, obstacles, nearby) {
-                    Sweep::Free(turned) => Turned { met: true, ..turned },
-                    Sweep::Stuck => Turned { direction, met: true, clear: false },
+        let (mut from, mut is_out) = (self.from, false);
+        loop {
+            match self.sweep(&from, method, obstacles, nearby) {
+                Sweep::Free(turned) => return Turned { met: turned.met || is_out, ..turned },
+                Sweep::Stuck if is_out => return Turned { direction: from, met: true, clear: false },
+                Sweep::Stuck => match self.turn_out(method, obstacles, nearby) {
+                    None => return Turned { direction: from, met: true, clear: false },
+                    Some(direction) => (from, is_out) = (direction, true),
                 },
-            },
+            }
         }
     }
 
@@ -157,8 +158,14 @@ impl Segment<'_> {
     }
 
     #[inline(always)]
-    fn sweep<'t>(&self, method: ContactMethod, obstacles: &[&'t TriangleTree], nearby: &mut Nearby<'t>) -> Sweep {
-        let sector = self.sector(self.from, self.to);
+    fn sweep<'t>(
+        &self,
+        from: &DVec3,
+        method: ContactMethod,
+        obstacles: &[&'t TriangleTree],
+        nearby: &mut Nearby<'t>,
+    ) -> Sweep {
+        let sector = self.sector(*from, self.to);
         let (low, high) = sector.bounds(&self.to);
         gather(obstacles, low, high, nearby);
         if nearby.is_empty() {
