@@ -122,7 +122,7 @@ impl Segment<'_> {
     ) -> Turned {
         let (mut from, mut is_out) = (self.from, false);
         loop {
-            match self.sweep(&from, method, obstacles, nearby) {
+            match self.sweep(from, method, obstacles, nearby) {
                 Sweep::Free(turned) => return Turned { met: turned.met || is_out, ..turned },
                 Sweep::Stuck if is_out => return Turned { direction: from, met: true, clear: false },
                 Sweep::Stuck => match self.turn_out(method, obstacles, nearby) {
@@ -160,12 +160,12 @@ impl Segment<'_> {
     #[inline(always)]
     fn sweep<'t>(
         &self,
-        from: &DVec3,
+        from: DVec3,
         method: ContactMethod,
         obstacles: &[&'t TriangleTree],
         nearby: &mut Nearby<'t>,
     ) -> Sweep {
-        let sector = self.sector(*from, self.to);
+        let sector = self.sector(from, self.to);
         let (low, high) = sector.bounds(&self.to);
         gather(obstacles, low, high, nearby);
         if nearby.is_empty() {
@@ -465,17 +465,17 @@ impl Sector {
     #[inline(always)]
     pub(super) fn bounds(&self, end: &DVec3) -> (Vec3, Vec3) {
         let (sine, cosine) = (end.dot(&self.v), end.dot(&self.u));
+        let past = self.u * sine - self.v * cosine;
         let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
         for axis in 0..3 {
             let (u, v) = (self.u[axis], self.v[axis]);
             let (mut least, mut most) = (0.0_f64.min(u).min(end[axis]), 0.0_f64.max(u).max(end[axis]));
             // The farthest points of the whole circle along this axis lie at ±(u, v)/|(u, v)|; one counts where the
             // sector turns past it: forwards from u, and not farther than the end.
-            let past = u * sine - v * cosine;
-            if v >= 0.0 && past >= 0.0 {
+            if v >= 0.0 && past[axis] >= 0.0 {
                 most = (u * u + v * v).sqrt();
             }
-            if v <= 0.0 && past <= 0.0 {
+            if v <= 0.0 && past[axis] <= 0.0 {
                 least = -(u * u + v * v).sqrt();
             }
             let slack = self.half + (self.back + self.half) + 1e-6 * (self.reach + self.pivot[axis].abs());
