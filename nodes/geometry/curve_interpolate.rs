@@ -39,9 +39,7 @@ params! { PARAMS:
     CVS: Param<i64> = Param::int("cvs", 0, "Number of CVs of each hair. 0 uses the largest CV count of any guide.")
         .within(0.0, 10_000.0).soft(0.0, 32.0);
     SEED: Param<Seed> = Param::seed("Each seed gives other root positions.");
-    MASK: Param<Name> = Param::text("mask", "",
-        "Name of a point attribute of the skin that multiplies the density: 0 grows nothing, 1 the full density. If \
-         empty, there is no mask.").fixed();
+    MASK: Param<Name> = planting::MASK;
 }
 
 const CURVES: Output = Output::new(

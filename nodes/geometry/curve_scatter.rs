@@ -38,9 +38,7 @@ params! { PARAMS:
         "Width of every curve. 0 leaves curves without the attribute `width`.")
         .unit(Unit::Metres).at_least(0.0).soft(0.0, 0.01);
     SEED: Param<Seed> = Param::seed("Each seed gives other positions, lengths and directions.");
-    MASK: Param<Name> = Param::text("mask", "",
-        "Name of a point attribute of the skin that multiplies the density: 0 grows nothing, 1 the full density. If \
-         empty, there is no mask.").fixed();
+    MASK: Param<Name> = planting::MASK;
 }
 
 const CURVES: Output = Output::new(

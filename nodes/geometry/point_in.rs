@@ -9,18 +9,12 @@ params! { PARAMS:
     FILE: Param<Option<File>> = Param::file("file",
         "An obj, ply or json file with points. A run of `#` in its name stands for the frame number, as in \
          `drops.####.ply`.");
-    FRAME: Param<i64> = Param::int("frame", 0,
-        "The number of the file to read, if `file` names a numbered sequence. Fractions are rounded down. \
-         Between whole frames of the scene points move in straight lines from one file to the next, if it has the same points. \
-         A file that is missing is an error, also before the first: `{\"expr\": \"max(frame, 1)\"}` holds file 1 before frame 1.")
-        .unit(Unit::Frame).default_current_frame();
+    FRAME: Param<i64> = source::FRAME;
     POINTS: Param<Option<Arc<Vec<[f32; 3]>>>> = Param::inline("points",
         "Positions of points given in the graph instead of a file.").unit(Unit::Metres);
     ATTRIBUTES: Param<Arc<Vec<(Name, Column)>>> = Param::inline("attributes", "Attributes of \
         points, given in the graph by name, one value per point: `{\"mask\": [0, 0.5, 1]}`.");
-    SCALE: Param<f64> = Param::double("scale", 1.0,
-        "Multiplies positions, velocities and widths. 0.01 converts a file in centimetres to metres.")
-        .soft(0.001, 1000.0);
+    SCALE: Param<f64> = source::SCALE;
 }
 
 const OUT: Output = Output::new("points", &[Kind::Points], "The points.");

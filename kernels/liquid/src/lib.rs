@@ -14,6 +14,7 @@
 extern crate self as liquid;
 
 pub mod carried;
+mod chebyshev;
 mod dense;
 pub mod extract;
 pub mod fields;

@@ -8,6 +8,15 @@ use numerics::random::Key;
 /// Largest number of CVs: with `Pref` and `uvw` they take 2.4 gigabytes.
 const MOST_CVS: f64 = (1_u32 << 26) as f64;
 
+/// Where on the skin few grow.
+pub(crate) const MASK: Param<Name> = Param::text(
+    "mask",
+    "",
+    "Name of a point attribute of the skin that multiplies the density: 0 grows nothing, 1 the full density. If empty, there \
+     is no mask.",
+)
+.fixed();
+
 /// How many curves to plant, and where.
 pub(crate) struct Planting<'a> {
     /// Curves on a square metre.

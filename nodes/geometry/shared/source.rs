@@ -14,6 +14,25 @@ pub(crate) const COMPONENTS: Metric = Metric::new(
         reads.",
 );
 
+/// Which file of a numbered sequence is read.
+pub(crate) const FRAME: Param<i64> = Param::int(
+    "frame",
+    0,
+    "The number of the file to read, if `file` names a numbered sequence. Fractions are rounded down. Between whole frames of \
+     the scene points move in straight lines from one file to the next, if it has the same points. A file that is missing is \
+     an error, also before the first: `{\"expr\": \"max(frame, 1)\"}` holds file 1 before frame 1.",
+)
+.unit(Unit::Frame)
+.default_current_frame();
+
+/// The unit of what is read.
+pub(crate) const SCALE: Param<f64> = Param::double(
+    "scale",
+    1.0,
+    "Multiplies positions, velocities and widths. 0.01 converts a file in centimetres to metres.",
+)
+.soft(0.001, 1000.0);
+
 /// The component of `kind` in a file; other geometry is ignored, but counted.
 ///
 /// # Errors

@@ -2,6 +2,7 @@
 
 use numerics::simd::{Path, kernel};
 
+use crate::chebyshev::{Chebyshev, Weights};
 use crate::rows::{CellRows, Images};
 use crate::stencil::{Run, Stencil};
 
@@ -41,12 +42,8 @@ pub(super) type SurfaceDistances = [Vec<f32>; 3];
 /// [`coarsen`](super::coarsen).
 pub(super) const HALO: i32 = 2;
 
-/// The interval of eigenvalues of D⁻¹A on which the smoother acts: the upper end, and its ratio to the lower.
-const LARGEST_EIGENVALUE: f64 = 2.0;
-const EIGENVALUE_RATIO: f64 = 10.0;
-
-/// Steps of the smoother.
-const DEGREE: usize = 3;
+/// What a smoothing takes from errors.
+const SMOOTHER: Chebyshev = Chebyshev { largest: 2.0, ratio: 10.0, degree: 3 };
 
 impl Level {
     /// The matrix of the `liquid` cells.
@@ -111,21 +108,10 @@ impl Level {
     /// as 0. `spare` and `step` are scratch; all three are 0 where the cell is not liquid.
     pub(super) fn smooth(&self, from_zero: bool, b: &[f32], q: &mut Vec<f32>, spare: &mut Vec<f32>, step: &mut [f32]) {
         let path = Path::chosen();
-        let (lowest, highest) = (LARGEST_EIGENVALUE / EIGENVALUE_RATIO, LARGEST_EIGENVALUE);
-        let (middle, half) = (0.5 * (highest + lowest), 0.5 * (highest - lowest));
-        let mut rho = half / middle;
-        for degree in 0..DEGREE {
-            let (decay, gain) = match degree {
-                0 => (0.0, 1.0 / middle),
-                _ => {
-                    let before = rho;
-                    rho = 1.0 / (2.0 * middle / half - rho);
-                    (rho * before, 2.0 * rho / half)
-                }
-            };
+        for (degree, weights) in SMOOTHER.steps().enumerate() {
             self.images.fill(q);
             let inverse = &self.inverse_diagonal[..];
-            let weigh = Weighing { inverse, decay: decay as f32, gain: gain as f32 };
+            let weigh = Weighing { inverse, weights };
             let equation = Equation { matrix: self.matrix(), q, b };
             if degree == 0 && from_zero {
                 self.stencil.update([&mut spare[..], step], |runs, first, [q, step]| {
@@ -157,8 +143,7 @@ struct Equation<'a> {
 
 struct Weighing<'a> {
     inverse: &'a [f32],
-    decay: f32,
-    gain: f32,
+    weights: Weights,
 }
 
 kernel! {
@@ -236,7 +221,7 @@ fn smooth_body(
     out: &mut [f32],
     step: &mut [f32],
 ) {
-    let (decay, gain) = (weigh.decay, weigh.gain);
+    let Weights { decay, gain } = weigh.weights;
     for run in runs {
         let here = run.at as usize - first..run.at as usize - first + run.len as usize;
         let (out, step) = (&mut out[here.clone()], &mut step[here]);
@@ -255,7 +240,7 @@ fn first_body(runs: &[Run], first: usize, weigh: &Weighing<'_>, b: &[f32], q: &m
         let (q, step) = (&mut q[here.clone()], &mut step[here]);
         let (b, inverse) = (&b[run.range()], &weigh.inverse[run.range()]);
         for i in 0..run.len as usize {
-            step[i] = weigh.gain * inverse[i] * b[i];
+            step[i] = weigh.weights.gain * inverse[i] * b[i];
             q[i] = step[i];
         }
     }

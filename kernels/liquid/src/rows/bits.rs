@@ -109,7 +109,7 @@ mod tests {
         let inside = |[x, y, z]: Cell| (x * 7 + y * 5 + z * 3).rem_euclid(23) == 0 && (x + y) % 3 != 0;
         let rows = CellRows::cuboid([-70, -4, -3], [80, 9, 6]).filtered(|cell, _| inside(cell));
         for (by, low, high) in
-            [(1, [-200; 3], [200; 3]), (2, [-60, -2, 1], [70, 5, 20]), (4, [-71, -9, -9], [81, 0, 0])]
+            [(1, [-200, -8, -8], [200, 14, 12]), (2, [-60, -2, 1], [70, 5, 20]), (4, [-71, -9, -9], [81, 0, 0])]
         {
             let near = dilated(&rows, by, low, high);
             let expected = CellRows::cuboid(low, high).filtered(|cell, _| {

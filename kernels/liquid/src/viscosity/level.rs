@@ -4,6 +4,7 @@
 
 use numerics::simd::{Path, kernel};
 
+use crate::chebyshev::{Chebyshev, Weights};
 use crate::fields::in_parts;
 use crate::rows::{Cell, CellRows, Images};
 use crate::stencil::{Run, Stencil};
@@ -68,12 +69,8 @@ impl<T: Copy + Default> Stresses<T> {
     }
 }
 
-/// The interval of eigenvalues of D⁻¹A on which the smoother acts: the upper end, and its ratio to the lower.
-const LARGEST_EIGENVALUE: f64 = 3.3;
-const EIGENVALUE_RATIO: f64 = 16.0;
-
-/// Steps of the smoother.
-const DEGREE: usize = 4;
+/// What a smoothing takes from errors.
+const SMOOTHER: Chebyshev = Chebyshev { largest: 3.3, ratio: 16.0, degree: 4 };
 
 impl Level {
     /// The matrix of the faces with a mass; `inverse_diagonal` is not read.
@@ -221,20 +218,9 @@ impl Level {
     /// as 0. All fields are 0 where the face is not free.
     pub(super) fn smooth(&self, from_zero: bool, b: &FaceFields<f32>, smoothing: &mut Smoothing) {
         let path = Path::chosen();
-        let (lowest, highest) = (LARGEST_EIGENVALUE / EIGENVALUE_RATIO, LARGEST_EIGENVALUE);
-        let (middle, half) = (0.5 * (highest + lowest), 0.5 * (highest - lowest));
-        let mut rho = half / middle;
-        for degree in 0..DEGREE {
-            let (decay, gain) = match degree {
-                0 => (0.0, 1.0 / middle),
-                _ => {
-                    let before = rho;
-                    rho = 1.0 / (2.0 * middle / half - rho);
-                    (rho * before, 2.0 * rho / half)
-                }
-            };
+        for (degree, weights) in SMOOTHER.steps().enumerate() {
             let Smoothing { u, step, product, stresses } = &mut *smoothing;
-            let weigh = Weighing { inverse: &self.inverse_diagonal, b, decay: decay as f32, gain: gain as f32 };
+            let weigh = Weighing { inverse: &self.inverse_diagonal, b, weights };
             let is_zero = degree == 0 && from_zero;
             if !is_zero {
                 self.multiply(path, u, stresses, product);
@@ -271,8 +257,7 @@ struct Balance<'a, T> {
 struct Weighing<'a> {
     inverse: &'a FaceFields<f32>,
     b: &'a FaceFields<f32>,
-    decay: f32,
-    gain: f32,
+    weights: Weights,
 }
 
 kernel! {
@@ -412,7 +397,7 @@ fn residual_body(runs: &[Run], first: usize, b: &FaceFields<f32>, scale: &FaceFi
 #[inline(always)]
 fn smooth_body(runs: &[Run], first: usize, product: &FaceFields<f32>, weigh: &Weighing<'_>, out: [&mut [f32]; 6]) {
     let [x, y, z, step_x, step_y, step_z] = out;
-    let (decay, gain) = (weigh.decay, weigh.gain);
+    let Weights { decay, gain } = weigh.weights;
     for (axis, (u, step)) in [(x, step_x), (y, step_y), (z, step_z)].into_iter().enumerate() {
         for run in runs {
             let (at, n) = (run.at as usize, run.len as usize);
@@ -436,7 +421,7 @@ fn first_body(runs: &[Run], first: usize, weigh: &Weighing<'_>, out: [&mut [f32]
             let (inverse, b) = (from(&weigh.inverse[axis], at, n), from(&weigh.b[axis], at, n));
             let (u, step) = (&mut u[at - first..][..n], &mut step[at - first..][..n]);
             for i in 0..n {
-                step[i] = weigh.gain * inverse[i] * b[i];
+                step[i] = weigh.weights.gain * inverse[i] * b[i];
                 u[i] = step[i];
             }
         }
