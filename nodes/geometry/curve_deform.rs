@@ -82,7 +82,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Curve_Deform",
-    5,
+    6,
     "Lets an existing groom follow guide curves, so that only a few hundred guides need to be simulated. Each curve \
      turns as the guides nearest to its root have turned since rest, and keeps its own shape, length and attributes. If \
      `skin` is wired, curves are kept out of it.",

@@ -70,6 +70,14 @@ struct Member {
     triangle: u32,
 }
 
+impl Member {
+    #[inline(always)]
+    fn corners(&self, points: &[Vec3]) -> [Vec3; 3] {
+        let [a, b, c] = self.points;
+        [points[a as usize], points[b as usize], points[c as usize]]
+    }
+}
+
 impl TriangleTree {
     /// The tree over `triangles`, each three indices of `points` (metres).
     ///
@@ -198,16 +206,23 @@ impl Block {
     /// Sets it to up to sixteen triangles.
     #[inline(always)]
     fn set(&mut self, points: &[Vec3], members: &[Member]) {
+        for (lane, member) in members.iter().enumerate() {
+            self.put(lane, member.corners(points));
+            self.triangle[lane] = member.triangle;
+        }
+        if members.len() < LANES || !self.is_finite() {
+            self.set_some(points, members);
+        }
+    }
+
+    /// The same, where there are fewer or not all are finite.
+    #[inline(never)]
+    fn set_some(&mut self, points: &[Vec3], members: &[Member]) {
         *self = Self::empty();
         let mut first = LANES;
         for (lane, member) in members.iter().enumerate() {
-            let [a, b, c] = member.points;
-            let corners = [points[a as usize], points[b as usize], points[c as usize]];
-            let mut finite = true;
-            for corner in &corners {
-                finite &= corner[0].is_finite() & corner[1].is_finite() & corner[2].is_finite();
-            }
-            if finite {
+            let corners = member.corners(points);
+            if corners.as_flattened().iter().all(|x| x.is_finite()) {
                 self.put(lane, corners);
                 self.triangle[lane] = member.triangle;
                 first = if first == LANES { lane } else { first };
@@ -223,6 +238,25 @@ impl Block {
                 self.put(lane, repeated);
             }
         }
+    }
+
+    /// Whether all coordinates are.
+    #[inline(always)]
+    fn is_finite(&self) -> bool {
+        let mut sizes = F32x16::splat(0.0);
+        for corner in &self.corners {
+            for axis in corner {
+                for lane in 0..LANES {
+                    // Where one is NaN or infinite, so is the sum.
+                    sizes.0[lane] += axis.0[lane] * 0.0;
+                }
+            }
+        }
+        let mut finite = true;
+        for lane in 0..LANES {
+            finite &= sizes.0[lane] == 0.0;
+        }
+        finite
     }
 
     #[inline(always)]

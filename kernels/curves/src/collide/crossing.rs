@@ -85,10 +85,14 @@ pub(super) fn crosses_block(block: &Block, boxes: &Boxes, lanes: u16, a: Vec3, b
         high[axis] = high[axis].max(b[axis]);
     }
     let lanes = lanes & Cuboid { low, high }.meeting(boxes);
+    lanes != 0 && crosses_some(block, lanes, a, b)
+}
+
+/// Whether the segment from `a` to `b` crosses one of some triangles of a block.
+#[inline(always)]
+pub(super) fn crosses_some(block: &Block, lanes: u16, a: Vec3, b: Vec3) -> bool {
     let mut first = None;
-    if lanes != 0 {
-        add_crossings(block, lanes, a, b, &mut first);
-    }
+    add_crossings(block, lanes, a, b, &mut first);
     first.is_some()
 }
 

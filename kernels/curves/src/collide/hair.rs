@@ -88,15 +88,17 @@ impl Hair<'_> {
                 self.keep_goals(k, &mut change);
                 break;
             }
-            let along = goal[k + 1] - goal[k];
-            let length = (to_f64(self.goal[k + 1]) - to_f64(self.goal[k])).norm();
-            if length == 0.0 || along.norm() == 0.0 {
+            let (along, own) = (goal[k + 1] - goal[k], to_f64(self.goal[k + 1]) - to_f64(self.goal[k]));
+            let length = own.norm();
+            // Most goals are neither displaced nor raised.
+            let distance = if same(&along, &own) { length } else { along.norm() };
+            if length == 0.0 || distance == 0.0 {
                 self.out[k + 1] = self.out[k];
                 directions.push(DVec3::zeros());
                 change.add(length, 0.0);
                 continue;
             }
-            let wanted = along / along.norm();
+            let wanted = along / distance;
             let rounding = 1.2e-7 * (f64::from(largest) + length);
             let (segment, ground) = self.segment(how, k, (&wanted, &goal[k..]), [length, rounding], &carried, axes);
             let way_out = ground.map(|(up, rest)| WayOut { up, rest, others });

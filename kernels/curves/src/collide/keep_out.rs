@@ -11,7 +11,7 @@
 //! not lifted the start, which touches the skin, is not tested. Surfaces are obstacles, not volumes: a curve wholly inside
 //! stays there.
 
-use super::crossing::crosses_block;
+use super::crossing::crosses_some;
 use super::hair::SKIPPED_GAPS;
 use super::half_space::HalfSpace;
 use super::kept_half_spaces::{BATCH_CURVES, KeptHalfSpaces};
@@ -23,7 +23,7 @@ use numerics::lanes::{F32x16, LANES, set};
 use numerics::masked::Masked;
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
-use numerics::tree::TriangleTree;
+use numerics::tree::{Cuboid, Region, TriangleTree};
 use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
 use settle::{Entered, settle};
 use std::ops::Range;
@@ -143,6 +143,17 @@ struct Entering {
     shift: DVec3,
 }
 
+/// The start of a curve.
+#[derive(Clone, Copy)]
+struct Beginning {
+    /// On the skin.
+    root: DVec3,
+    /// Whether the curve is off it.
+    lifted: bool,
+    /// Where the tested part starts, at rest and now; see [`tested_start`].
+    tested: [Option<Vec3>; 2],
+}
+
 /// Moves CVs; without a shift they keep their bits.
 fn shifted(cvs: &mut [Vec3], shift: &DVec3) {
     if *shift != DVec3::zeros() {
@@ -260,6 +271,17 @@ impl KeepOut<'_> {
         }
         let moved = to_f64(root) - to_f64(out[0]);
         shifted(out, &moved);
+    }
+
+    /// The start of a curve whose first CV is `cv`, and whose first two are now at `now`.
+    fn beginning(&self, curve: usize, cv: usize, now: [Vec3; 2]) -> Beginning {
+        let root = self.root(curve, cv);
+        let lifted = self.is_lifted(now[0], &root);
+        let untested = self.untested(lifted);
+        let mut rest = [[0.0; 3]; 2];
+        self.write_rest(curve, cv..cv + 2, now[0], &mut rest);
+        let tested = [tested_start(&rest, untested), tested_start(&now, untested)];
+        Beginning { root, lifted, tested }
     }
 
     fn collision<'o>(&self, obstacles: &'o [&'o TriangleTree], lifted: bool) -> Collide<'o>
@@ -389,13 +411,16 @@ fn entering_task(
         if *may_meet == 0 || now.len() < 2 || !is_finite(now) {
             continue;
         }
-        let root = how.root(curve, cvs.start);
-        let lifted = how.is_lifted(now[0], &root);
-        let untested = how.untested(lifted);
-        let mut first_rest = [[0.0; 3]; 2];
-        how.write_rest(curve, cvs.start..cvs.start + 2, now[0], &mut first_rest);
-        let (outside, start, tree) = (tested_start(&first_rest, untested), tested_start(now, untested), how.skin.tree);
-        if crosses(now, [outside, start], tree, &Tested::Segments(*may_meet), &mut nearby) {
+        let (first, tree) = ([now[0], now[1]], how.skin.tree);
+        // Of no use where the first segment is not tested, and what it is made of would have to be fetched.
+        let mut beginning = None;
+        if may_meet & 1 == 1 {
+            beginning = Some(how.beginning(curve, cvs.start, first));
+        }
+        let starts = beginning.as_ref().map_or([None; 2], |beginning| beginning.tested);
+        if crosses(now, starts, tree, &Tested::Segments(*may_meet), &mut nearby) {
+            let known = beginning.unwrap_or_else(|| how.beginning(curve, cvs.start, first));
+            let Beginning { root, lifted, tested: [outside, _] } = known;
             let mut one = Entering { curve: curve as u32, at_rest: false, lifted, shift: DVec3::zeros() };
             let tested = Tested::Outside(how.clearance.half_spaces.get(curve).zip(Some(root)));
             rest.resize(now.len(), [0.0; 3]);
@@ -412,7 +437,8 @@ fn entering_task(
 }
 
 fn is_finite(cvs: &[Vec3]) -> bool {
-    cvs.as_flattened().iter().all(|x| x.is_finite())
+    // Without a branch between them, which the compiler would not vectorise.
+    cvs.as_flattened().iter().fold(true, |finite, x| finite & x.is_finite())
 }
 
 /// Rounding of positions up to this size and length.
@@ -435,12 +461,25 @@ fn tested_start(cvs: &[Vec3], untested: f64) -> Option<Vec3> {
     (length > untested).then(|| to_f32(to_f64(cvs[0]) + along * (untested / length)))
 }
 
-/// Widens a box to include a point; without regard to NaN, which the library's `min` has.
-#[inline(always)]
-fn widen(low: &mut Vec3, high: &mut Vec3, point: Vec3) {
-    for axis in 0..3 {
-        low[axis] = if point[axis] < low[axis] { point[axis] } else { low[axis] };
-        high[axis] = if point[axis] > high[axis] { point[axis] } else { high[axis] };
+/// A segment, or what the start of a curve has passed through, with the box around it.
+#[derive(Clone, Copy)]
+struct Piece {
+    from: Vec3,
+    to: Vec3,
+    around: Cuboid,
+}
+
+impl Piece {
+    const NONE: Self = Self { from: [0.0; 3], to: [0.0; 3], around: Cuboid { low: [0.0; 3], high: [0.0; 3] } };
+
+    #[inline(always)]
+    fn between(from: Vec3, to: Vec3) -> Self {
+        let mut around = Cuboid { low: from, high: from };
+        for axis in 0..3 {
+            around.low[axis] = around.low[axis].min(to[axis]);
+            around.high[axis] = around.high[axis].max(to[axis]);
+        }
+        Self { from, to, around }
     }
 }
 
@@ -475,43 +514,44 @@ fn crosses<'t>(
 ) -> bool {
     let last = cvs.len() - 1;
     for first in (0..last).step_by(GATHERED_SEGMENTS) {
-        let end = last.min(first + GATHERED_SEGMENTS);
-        let (mut low, mut high) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        let mut tested = [false; GATHERED_SEGMENTS];
-        for k in first..end {
+        let (mut pieces, mut count) = ([Piece::NONE; GATHERED_SEGMENTS + 1], 0);
+        for k in first..last.min(first + GATHERED_SEGMENTS) {
             let Some(from) = (if k == 0 { start } else { Some(cvs[k]) }) else { continue };
             if which.leaves_out(k, from, cvs[k + 1]) {
                 continue;
             }
-            tested[k - first] = true;
-            widen(&mut low, &mut high, from);
-            widen(&mut low, &mut high, cvs[k + 1]);
+            pieces[count] = Piece::between(from, cvs[k + 1]);
+            count += 1;
             if k == 0
-                && let Some(outside) = outside
+                && let Some(outside) = outside.filter(|outside| *outside != from)
             {
-                widen(&mut low, &mut high, outside);
+                pieces[count] = Piece::between(outside, from);
+                count += 1;
             }
         }
-        if low[0] > high[0] {
-            continue;
+        let pieces = &pieces[..count];
+        let Some(Piece { around: Cuboid { mut low, mut high }, .. }) = pieces.first().copied() else { continue };
+        for Piece { around, .. } in &pieces[1..] {
+            for axis in 0..3 {
+                low[axis] = low[axis].min(around.low[axis]);
+                high[axis] = high[axis].max(around.high[axis]);
+            }
         }
         gather(&[tree], low, high, nearby);
-        if nearby.is_empty() {
-            continue;
-        }
         for (block, lanes) in nearby.iter() {
-            let boxes = block.boxes();
-            for k in first..end {
-                let Some(from) = (if k == 0 { start } else { Some(cvs[k]) }) else { continue };
-                if tested[k - first] && crosses_block(block, &boxes, *lanes, from, cvs[k + 1]) {
+            // All boxes before the first triangle, without branches.
+            let (boxes, mut meeting, mut any) = (block.boxes(), [0; GATHERED_SEGMENTS + 1], 0);
+            for (meeting, piece) in meeting.iter_mut().zip(pieces) {
+                *meeting = lanes & piece.around.meeting(&boxes);
+                any |= *meeting;
+            }
+            if any == 0 {
+                continue;
+            }
+            for (lanes, piece) in meeting.into_iter().zip(pieces) {
+                if lanes != 0 && crosses_some(block, lanes, piece.from, piece.to) {
                     return true;
                 }
-            }
-            if let (Some(outside), Some(start), true) = (outside, start, first == 0 && tested[0])
-                && outside != start
-                && crosses_block(block, &boxes, *lanes, outside, start)
-            {
-                return true;
             }
         }
     }

@@ -3,12 +3,12 @@
 
 use super::turns::{GuideSegments, NO_GUIDE, segment_middles};
 use crate::guides::GuideWeights;
-use numerics::lanes::{F32x16, F64x16, LANES, Lanes, set};
+use numerics::lanes::{F32x16, LANES, Lanes, set};
 use numerics::parallel;
 
 /// The guides of hairs, where along them the hairs' segments are, and the hairs at rest.
 ///
-/// 24 bytes for each guide of a hair, 12 for each guide of a segment, and 12 for each CV; hairs with fewer than the longest
+/// 24 bytes for each guide of a hair, 8 for each guide of a segment, and 12 for each CV; hairs with fewer than the longest
 /// of the sixteen beside them take as much as that one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HairGuides {
@@ -48,7 +48,7 @@ pub(super) struct LanePlaces {
     /// Rows of [`GuideSegments`].
     pub(super) rows: [u32; LANES],
     /// How far each is towards the row after it, 0..1.
-    pub(super) shares: F64x16,
+    pub(super) shares: F32x16,
 }
 
 /// Sixteens of hairs in a task.
@@ -87,8 +87,9 @@ impl HairGuides {
                     let mut row = segments.first(weight.guide as usize);
                     for (segment, middle) in of_hair(hair).iter().enumerate() {
                         let place = &mut places[segment * per_hair + rank];
-                        (row, place.shares.0[lane]) = segments.place(row, *middle);
-                        place.rows[lane] = row;
+                        let share;
+                        (row, share) = segments.place(row, *middle);
+                        (place.rows[lane], place.shares.0[lane]) = (row, share as f32);
                     }
                 }
             }
@@ -144,5 +145,5 @@ impl LaneGuides {
 }
 
 impl LanePlaces {
-    const NONE: Self = Self { rows: [NO_GUIDE; LANES], shares: F64x16::ZERO };
+    const NONE: Self = Self { rows: [NO_GUIDE; LANES], shares: F32x16([0.0; LANES]) };
 }

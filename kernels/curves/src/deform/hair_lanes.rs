@@ -2,7 +2,7 @@
 
 use super::hair_guides::{KnownLanes, LaneGuides, LanePlaces};
 use super::hairs::{CurveDeform, DeformedCurves};
-use super::turns::{LaneTurns, NO_GUIDE, Turn};
+use super::turns::{LaneTurns, NO_GUIDE, Turn, turn_at};
 use crate::attach::RootPose;
 use nalgebra::{Quaternion, Unit};
 use numerics::lanes::{F32x16, F64x16, LANES, Lanes, get};
@@ -10,32 +10,33 @@ use numerics::vector::{DQuat, DVec3, Vec3};
 use std::ops::Range;
 
 /// Below this the sum of rotations has cancelled, and the guide with the largest weight decides.
-const CANCELLED: f64 = 1e-9;
+const CANCELLED: f32 = 1e-6;
 
 /// Quaternions q and −q are one rotation. Where the product of a guide's with that of the heaviest guide is below this, they
 /// are more than 240° apart by way of rest, and less than 120° the other way: the guide passed half a turn before the
 /// other, or after it, and counts with the other sign. Not as soon as the other way is the shorter, since guides that lie
 /// down on the two sides of a parting are half a turn apart, and what is between them stands.
-const FAR_APART: f64 = -0.5;
+const FAR_APART: f32 = -0.5;
 
 /// No rotations with at least this w, of 120° and a little less, are [`FAR_APART`].
-const NEVER_FAR_APART: f64 = 0.5 + 1e-6;
+const NEVER_FAR_APART: f32 = 0.5 + 1e-6;
 
 /// Weights sum to 1 up to this.
-const WEIGHT_ROUNDING: f64 = 1e-6;
+const WEIGHT_ROUNDING: f32 = 1e-6;
 
 /// What one guide of each hair contributes.
 #[derive(Clone)]
 pub(super) struct Share {
-    weight: F64x16,
+    weight: F32x16,
     /// The weight times the rotation from the guide's frame to the hair's, row by row.
-    matrix: [F64x16; 9],
+    matrix: [F32x16; 9],
     /// The guides' rotations at the segment that is turned.
     turns: [Turn; LANES],
 }
 
 impl Share {
-    const NONE: Self = Self { weight: F64x16::ZERO, matrix: [F64x16::ZERO; 9], turns: [[0.0; 4]; LANES] };
+    const NONE: Self =
+        Self { weight: F32x16([0.0; LANES]), matrix: [F32x16([0.0; LANES]); 9], turns: [[0.0; 4]; LANES] };
 }
 
 /// What is known of sixteen hairs while they are turned. Hairs are written one by one, each along its CVs: across
@@ -81,24 +82,25 @@ impl<'a> HairLanes<'a> {
     #[inline(always)]
     pub(super) fn follow(&self, scratch: &mut Scratch, base: usize, out: &mut [Vec3], done: &mut DeformedCurves) {
         scratch.now.resize(self.rest.len(), [F32x16::splat(0.0); 3]);
-        let (mut displacement, least_w) = self.gather(&mut scratch.shares);
+        let (mut offset, least_w) = self.gather(&mut scratch.shares);
         let part = self.blends(0);
         for axis in 0..3 {
             for lane in 0..LANES {
-                displacement[axis].0[lane] *= part.0[lane];
+                offset[axis].0[lane] *= part.0[lane];
             }
         }
+        let mut displacement = widened(&offset);
         let mut still = None;
         if let Some(poses) = self.how.poses {
-            still = Some(self.place_roots(poses, &mut displacement));
+            still = Some(self.place_roots(poses, &offset, &mut displacement));
         }
         let (unguided, may_be_far_apart) = (unguided(&scratch.shares), least_w < NEVER_FAR_APART);
         let (mut whole, mut largest) = (F64x16::ZERO, F64x16::ZERO);
         let Scratch { shares, now: moved } = scratch;
-        let (mut rest, mut now) = ([F64x16::ZERO; 3], [F32x16::splat(0.0); 3]);
+        let (mut rest, mut now) = ([F32x16::splat(0.0); 3], [F32x16::splat(0.0); 3]);
         for (k, (cv, out)) in self.rest.iter().zip(&mut *moved).enumerate() {
             let (from, before) = (rest, now);
-            rest = widened(cv);
+            rest = *cv;
             let Some(segment) = k.checked_sub(1) else {
                 now = displaced(cv, &displacement);
                 *out = now;
@@ -113,13 +115,13 @@ impl<'a> HairLanes<'a> {
             }
             for axis in 0..3 {
                 for lane in 0..LANES {
-                    displacement[axis].0[lane] += turned[axis].0[lane] - along[axis].0[lane];
+                    displacement[axis].0[lane] += f64::from(turned[axis].0[lane] - along[axis].0[lane]);
                 }
             }
             now = displaced(cv, &displacement);
             *out = now;
             self.write_rotations(segment, &turns, base, &mut done.rotations);
-            let (length, new) = (lengths(&along), lengths(&difference(&widened(&now), &widened(&before))));
+            let (length, new) = (lengths(&rest, &from), lengths(&now, &before));
             for lane in 0..LANES {
                 let error = (new.0[lane] - length.0[lane]).abs();
                 whole.0[lane] += length.0[lane];
@@ -159,12 +161,12 @@ impl<'a> HairLanes<'a> {
     /// Finds what the hairs' guides contribute; returns the mean offset of their roots, in the frames of the hairs, and the
     /// least w of all their rotations.
     #[inline(always)]
-    fn gather(&self, shares: &mut Vec<Share>) -> ([F64x16; 3], f64) {
-        let (mut offset, mut least_w) = ([F64x16::ZERO; 3], 1.0);
+    fn gather(&self, shares: &mut Vec<Share>) -> (Lanes<3>, f32) {
+        let (mut offset, mut least_w) = ([F32x16::splat(0.0); 3], 1.0);
         shares.resize(self.guides.len(), Share::NONE);
         for (guide, share) in self.guides.iter().zip(shares) {
             share.set(guide);
-            let mut arm = [F64x16::ZERO; 3];
+            let mut arm = [F32x16::splat(0.0); 3];
             for lane in 0..LANES {
                 let guide = self.how.turns.of_guide(guide.guide[lane]);
                 for axis in 0..3 {
@@ -183,22 +185,23 @@ impl<'a> HairLanes<'a> {
         (offset, least_w)
     }
 
-    /// Carries the displacements of roots along with their poses; returns the rotations of these.
+    /// Carries the offsets of roots along with their poses, and adds how these have moved; returns the rotations of these.
     #[inline(always)]
-    fn place_roots(&self, poses: &[RootPose], displacement: &mut [F64x16; 3]) -> LaneTurns {
+    fn place_roots(&self, poses: &[RootPose], offset: &Lanes<3>, displacement: &mut [F64x16; 3]) -> LaneTurns {
         let (mut still, mut moved) = (LaneTurns::none(), [F64x16::ZERO; 3]);
         for lane in 0..self.hairs {
             let pose = &poses[self.first + lane];
-            still.put(lane, &[pose.rotation.w, pose.rotation.i, pose.rotation.j, pose.rotation.k]);
+            let turn = [pose.rotation.w, pose.rotation.i, pose.rotation.j, pose.rotation.k];
+            still.put(lane, &turn.map(|part| part as f32));
             for axis in 0..3 {
                 moved[axis].0[lane] = pose.translation[axis];
             }
         }
         // Added as displacements, so that guides at rest change no bit.
-        let turned = still.rotate(displacement);
+        let turned = still.rotate(offset);
         for axis in 0..3 {
             for lane in 0..LANES {
-                displacement[axis].0[lane] = moved[axis].0[lane] + turned[axis].0[lane];
+                displacement[axis].0[lane] = moved[axis].0[lane] + f64::from(turned[axis].0[lane]);
             }
         }
         still
@@ -207,13 +210,14 @@ impl<'a> HairLanes<'a> {
     /// The mean rotations of the hairs' guides at the middle of a segment; `unguided` is the weight that no guide holds,
     /// `may_be_far_apart` whether any of these may be [`FAR_APART`].
     #[inline(always)]
-    fn turns(&self, shares: &mut [Share], segment: usize, unguided: &F64x16, may_be_far_apart: bool) -> LaneTurns {
-        let mut sum = LaneTurns([F64x16::ZERO; 4]);
+    fn turns(&self, shares: &mut [Share], segment: usize, unguided: &F32x16, may_be_far_apart: bool) -> LaneTurns {
+        let mut sum = LaneTurns::zero();
         let places = &self.places[segment * shares.len()..];
         // All are looked up before the first is read: what is read at once, across what was just written, is waited for.
+        let rows = self.how.turns.rows();
         for (share, places) in shares.iter_mut().zip(places) {
             for lane in 0..LANES {
-                share.turns[lane] = self.how.turns.at(places, lane);
+                share.turns[lane] = turn_at(rows, places, lane);
             }
         }
         if may_be_far_apart {
@@ -234,11 +238,11 @@ impl<'a> HairLanes<'a> {
             }
         }
         // Looked for on all lanes at once: there are hardly ever any.
-        let mut cancelled = F64x16::ZERO;
+        let mut cancelled = F32x16::splat(0.0);
         for lane in 0..LANES {
             cancelled.0[lane] = if sizes.0[lane] > CANCELLED { 0.0 } else { 1.0 };
         }
-        if cancelled != F64x16::ZERO {
+        if cancelled != F32x16::splat(0.0) {
             for lane in 0..self.hairs {
                 if cancelled.0[lane] > 0.0 {
                     unit.put(lane, &self.heaviest(lane, places));
@@ -250,15 +254,16 @@ impl<'a> HairLanes<'a> {
 
     /// The rotation, at one of these places, of the guide with the largest weight that has one.
     #[inline(always)]
-    fn heaviest(&self, lane: usize, places: &[LanePlaces]) -> [f64; 4] {
+    fn heaviest(&self, lane: usize, places: &[LanePlaces]) -> Turn {
         for (guide, places) in self.guides.iter().zip(places) {
             if places.rows[lane] != NO_GUIDE {
-                let turn = self.how.turns.at(places, lane);
+                let turn = turn_at(self.how.turns.rows(), places, lane);
                 let [x, y, z, w] = get(&guide.rotation, lane);
                 let rotation = Unit::new_unchecked(Quaternion::new(w, x, y, z).cast::<f64>());
-                let axis = rotation * DVec3::new(turn[1], turn[2], turn[3]);
-                let size = (turn[0] * turn[0] + axis.norm_squared()).sqrt();
-                return [turn[0] / size, axis.x / size, axis.y / size, axis.z / size];
+                let [cosine, axis @ ..] = turn.map(f64::from);
+                let axis = rotation * DVec3::from(axis);
+                let size = (cosine * cosine + axis.norm_squared()).sqrt();
+                return [cosine / size, axis.x / size, axis.y / size, axis.z / size].map(|part| part as f32);
             }
         }
         [1.0, 0.0, 0.0, 0.0]
@@ -272,11 +277,11 @@ impl<'a> HairLanes<'a> {
         }
         let part = self.blends(segment);
         for lane in 0..self.hairs {
-            let share = part.0[lane];
+            let share = f64::from(part.0[lane]);
             if share == 1.0 {
                 continue;
             }
-            let [w, axis @ ..] = turns.get(lane);
+            let [w, axis @ ..] = turns.get(lane).map(f64::from);
             let sine = DVec3::from(axis).norm();
             let mut some = [1.0, 0.0, 0.0, 0.0];
             if sine > 0.0 {
@@ -284,17 +289,17 @@ impl<'a> HairLanes<'a> {
                 let scale = part_sine / sine;
                 some = [part_cosine, axis[0] * scale, axis[1] * scale, axis[2] * scale];
             }
-            turns.put(lane, &some);
+            turns.put(lane, &some.map(|part| part as f32));
         }
     }
 
     /// How much of the guides' turn the hairs follow at their CV `cv`; 0 where there is none.
     #[inline(always)]
-    fn blends(&self, cv: usize) -> F64x16 {
-        let mut blends = F64x16::ZERO;
+    fn blends(&self, cv: usize) -> F32x16 {
+        let mut blends = F32x16::splat(0.0);
         for lane in 0..self.hairs {
             if cv < self.cvs[lane] {
-                blends.0[lane] = f64::from(self.how.blend.at(self.root[lane] + cv)).clamp(0.0, 1.0);
+                blends.0[lane] = self.how.blend.at(self.root[lane] + cv).clamp(0.0, 1.0);
             }
         }
         blends
@@ -322,8 +327,8 @@ impl<'a> HairLanes<'a> {
             if segment + 1 >= self.cvs[lane] {
                 continue;
             }
-            let [w, x, y, z] = turns.get(lane);
-            let mut rotation = Unit::new_unchecked(Quaternion::new(w, x, y, z));
+            let [w, x, y, z] = turns.get(lane).map(f64::from);
+            let mut rotation = Unit::new_normalize(Quaternion::new(w, x, y, z));
             if let Some(poses) = self.how.poses {
                 rotation = poses[self.first + lane].rotation * rotation;
             }
@@ -338,15 +343,13 @@ impl Share {
     #[inline(always)]
     fn set(&mut self, guide: &LaneGuides) {
         let Self { weight, matrix, .. } = self;
-        for lane in 0..LANES {
-            weight.0[lane] = f64::from(guide.weight.0[lane]);
-        }
+        *weight = guide.weight;
         let [x, y, z, w] = &guide.rotation;
         for lane in 0..LANES {
-            let (x, y, z, w) = (f64::from(x.0[lane]), f64::from(y.0[lane]), f64::from(z.0[lane]), f64::from(w.0[lane]));
+            let (x, y, z, w) = (x.0[lane], y.0[lane], z.0[lane], w.0[lane]);
             let weight = weight.0[lane];
             // Divided by its squared length, which rounding to f32 made unequal to 1.
-            let twice = 2.0 / (DVec3::new(x, y, z).norm_squared() + w * w);
+            let twice = 2.0 / (x * x + y * y + z * z + w * w);
             matrix[0].0[lane] = (1.0 - twice * (y * y + z * z)) * weight;
             matrix[1].0[lane] = twice * (x * y - w * z) * weight;
             matrix[2].0[lane] = twice * (x * z + w * y) * weight;
@@ -365,7 +368,7 @@ impl Share {
 fn add_aligned(sum: &mut LaneTurns, shares: &[Share]) {
     let mut heaviest = *sum;
     for (rank, share) in shares.iter().enumerate() {
-        let mut turns = LaneTurns([F64x16::ZERO; 4]);
+        let mut turns = LaneTurns::zero();
         turns.add_weighted(&LaneTurns::side_by_side(&share.turns), &share.weight, &share.matrix);
         if rank == 0 {
             heaviest = turns;
@@ -383,8 +386,8 @@ fn add_aligned(sum: &mut LaneTurns, shares: &[Share]) {
 
 /// The weight that no guide of each hair holds.
 #[inline(always)]
-fn unguided(shares: &[Share]) -> F64x16 {
-    let mut unguided = F64x16([1.0; LANES]);
+fn unguided(shares: &[Share]) -> F32x16 {
+    let mut unguided = F32x16::splat(1.0);
     for share in shares {
         for lane in 0..LANES {
             unguided.0[lane] -= share.weight.0[lane];
@@ -397,8 +400,8 @@ fn unguided(shares: &[Share]) -> F64x16 {
 }
 
 #[inline(always)]
-fn difference(a: &[F64x16; 3], b: &[F64x16; 3]) -> [F64x16; 3] {
-    let mut out = [F64x16::ZERO; 3];
+fn difference(a: &Lanes<3>, b: &Lanes<3>) -> Lanes<3> {
+    let mut out = [F32x16::splat(0.0); 3];
     for axis in 0..3 {
         for lane in 0..LANES {
             out[axis].0[lane] = a[axis].0[lane] - b[axis].0[lane];
@@ -430,11 +433,16 @@ fn widened(points: &Lanes<3>) -> [F64x16; 3] {
     out
 }
 
+/// The distances between points, in f64: squares of no scene's lengths overflow there.
 #[inline(always)]
-fn lengths([x, y, z]: &[F64x16; 3]) -> F64x16 {
+fn lengths(from: &Lanes<3>, to: &Lanes<3>) -> F64x16 {
+    let (from, to) = (widened(from), widened(to));
     let mut out = F64x16::ZERO;
     for lane in 0..LANES {
-        out.0[lane] = DVec3::new(x.0[lane], y.0[lane], z.0[lane]).norm();
+        let x = to[0].0[lane] - from[0].0[lane];
+        let y = to[1].0[lane] - from[1].0[lane];
+        let z = to[2].0[lane] - from[2].0[lane];
+        out.0[lane] = DVec3::new(x, y, z).norm();
     }
     out
 }

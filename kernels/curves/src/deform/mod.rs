@@ -10,8 +10,10 @@
 //! by the weighted mean of their guides' motions ([`carried_poses`]).
 //!
 //! Guarantees: guides and skin at rest change no bit; if all of them move rigidly, so do hairs; segments keep their
-//! lengths up to the rounding of positions; a hair that is a guide, alone at its root, becomes that guide; the same bits
-//! on any number of threads. f64 inside. Metres.
+//! lengths up to the rounding of positions and of a rotation in f32, 3e-7 of a segment; a hair that is a guide, alone at
+//! its root, becomes that guide to the same rounding; the same bits on any number of threads. Turns of guides are found in
+//! f64, those of hairs blended in f32, sixteen side by side; displacements are summed, and lengths measured, in f64.
+//! Metres.
 
 mod hair_guides;
 mod hair_lanes;

@@ -318,6 +318,32 @@ fn lengths_are_kept_whatever_guides_do() {
     }
 }
 
+/// Rotations in f32 change a segment by a few of its roundings, whatever the size of the scene.
+#[test]
+fn a_turn_keeps_lengths_to_rounding_at_any_scale() {
+    let (mut worst, mut off) = (0.0_f64, 0.0_f64);
+    for k in 0..400 {
+        let angle = |k: u64| 3.0 * f64::from(random(k));
+        let guides =
+            [[0.0; 2], [angle(3 * k), angle(3 * k + 1)]].map(|angles| Curves::of(&[bent([0.0; 3], 1.0, &angles)]));
+        // One segment from the origin on, so that positions are as finely rounded as lengths.
+        let hair = Curves::of(&[bent([0.0; 3], 1.0, &[angle(3 * k + 2)])]);
+        let scaled = |curves: &Curves, scale: f32| Curves {
+            points: curves.points.iter().map(|p| p.map(|x| scale * x)).collect(),
+            ..curves.clone()
+        };
+        let end = |scale: f32| {
+            let [rest, now, hair] = [&guides[0], &guides[1], &hair].map(|curves| scaled(curves, scale));
+            let out = deformed(&hair, [&rest, &now], &weights(&rest, &hair, 1), 1.0);
+            to_f64(out[1]) / f64::from(scale)
+        };
+        worst = worst.max((end(1.0).norm() / to_f64(hair.points[1]).norm() - 1.0).abs());
+        off = [1e-30, 1e30].iter().fold(off, |off, scale| off.max((end(*scale) - end(1.0)).amax()));
+    }
+    assert!(worst < 4e-7, "{worst}");
+    assert!(off < 1e-6, "{off}");
+}
+
 /// A hair that wanders over the skin changes its shape by little at each step, past every change of guides.
 #[test]
 fn there_are_no_seams_between_guides() {

@@ -3,29 +3,35 @@
 use super::hair_guides::LanePlaces;
 use crate::attach::RootPose;
 use nalgebra::{Quaternion, Vector3};
-use numerics::lanes::{F64x16, LANES};
+use numerics::lanes::{F32x16, LANES, Lanes};
 use numerics::parallel;
-use numerics::vector::{self, DQuat, DVec3, to_f32, to_f64};
+use numerics::vector::{self, DQuat, DVec3, Vec3, to_f32, to_f64};
 
 /// A rotation as w, x, y, z. Along a guide its sign is continuous: turns of more than half a revolution are kept
 /// apart from the lesser ones with the same result.
-pub(super) type Turn = [f64; 4];
+pub(super) type Turn = [f32; 4];
 
 /// Rotations of sixteen segments, side by side: w, x, y, z.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LaneTurns(pub(super) [F64x16; 4]);
+pub(super) struct LaneTurns(pub(super) Lanes<4>);
 
 impl LaneTurns {
     /// None on all lanes.
     #[inline(always)]
     pub(super) fn none() -> Self {
-        Self([F64x16([1.0; LANES]), F64x16::ZERO, F64x16::ZERO, F64x16::ZERO])
+        Self([1.0, 0.0, 0.0, 0.0].map(F32x16::splat))
+    }
+
+    /// Sums without a term.
+    #[inline(always)]
+    pub(super) fn zero() -> Self {
+        Self([F32x16::splat(0.0); 4])
     }
 
     /// Those of sixteen.
     #[inline(always)]
     pub(super) fn side_by_side(turns: &[Turn; LANES]) -> Self {
-        let mut out = Self([F64x16::ZERO; 4]);
+        let mut out = Self::zero();
         for part in 0..4 {
             for lane in 0..LANES {
                 out.0[part].0[lane] = turns[lane][part];
@@ -48,7 +54,7 @@ impl LaneTurns {
 
     /// Adds others times a weight; `matrix` is the weight times a rotation, row by row, which turns their axes.
     #[inline(always)]
-    pub(super) fn add_weighted(&mut self, other: &Self, weight: &F64x16, matrix: &[F64x16; 9]) {
+    pub(super) fn add_weighted(&mut self, other: &Self, weight: &F32x16, matrix: &[F32x16; 9]) {
         let [w, x, y, z] = &other.0;
         for lane in 0..LANES {
             self.0[0].0[lane] += weight.0[lane] * w.0[lane];
@@ -64,9 +70,9 @@ impl LaneTurns {
 
     /// Products of their quaternions, summed over the four parts.
     #[inline(always)]
-    pub(super) fn dot(&self, other: &Self) -> F64x16 {
+    pub(super) fn dot(&self, other: &Self) -> F32x16 {
         let ([w, x, y, z], [a, b, c, d]) = (&self.0, &other.0);
-        let mut dot = F64x16::ZERO;
+        let mut dot = F32x16::splat(0.0);
         for lane in 0..LANES {
             let axes = x.0[lane] * b.0[lane] + y.0[lane] * c.0[lane] + z.0[lane] * d.0[lane];
             dot.0[lane] = w.0[lane] * a.0[lane] + axes;
@@ -76,9 +82,9 @@ impl LaneTurns {
 
     /// Their lengths as quaternions.
     #[inline(always)]
-    pub(super) fn sizes(&self) -> F64x16 {
+    pub(super) fn sizes(&self) -> F32x16 {
         let [w, x, y, z] = &self.0;
-        let mut sizes = F64x16::ZERO;
+        let mut sizes = F32x16::splat(0.0);
         for lane in 0..LANES {
             let sine = x.0[lane] * x.0[lane] + y.0[lane] * y.0[lane] + z.0[lane] * z.0[lane];
             sizes.0[lane] = (w.0[lane] * w.0[lane] + sine).sqrt();
@@ -88,7 +94,7 @@ impl LaneTurns {
 
     /// Vectors turned by them; they must be of length 1.
     #[inline(always)]
-    pub(super) fn rotate(&self, vectors: &[F64x16; 3]) -> [F64x16; 3] {
+    pub(super) fn rotate(&self, vectors: &Lanes<3>) -> Lanes<3> {
         let [w, axis @ ..] = &self.0;
         let mut turned = cross_side_by_side(axis, vectors);
         for part in 0..3 {
@@ -107,8 +113,8 @@ impl LaneTurns {
 }
 
 #[inline(always)]
-fn cross_side_by_side(a: &[F64x16; 3], b: &[F64x16; 3]) -> [F64x16; 3] {
-    let mut out = [F64x16::ZERO; 3];
+fn cross_side_by_side(a: &Lanes<3>, b: &Lanes<3>) -> Lanes<3> {
+    let mut out = [F32x16::splat(0.0); 3];
     for axis in 0..3 {
         let (y, z) = ((axis + 1) % 3, (axis + 2) % 3);
         for lane in 0..LANES {
@@ -182,15 +188,15 @@ pub struct GuideTurns {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct GuideTurn {
     /// From where the skin carries the root to where it is, in the frame of the rows, metres.
-    pub(super) offset: DVec3,
+    pub(super) offset: Vec3,
     /// The least w of the guide's rows.
-    pub(super) least_w: f64,
+    pub(super) least_w: f32,
 }
 
 /// The rotation of a segment, and what is added to it up to the next segment's; on one line of the cache.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(align(64))]
-struct Row {
+#[repr(align(32))]
+pub(super) struct Row {
     here: Turn,
     step: Turn,
 }
@@ -219,7 +225,7 @@ impl GuideTurns {
     ) -> Self {
         let guides = starts.len().saturating_sub(1);
         let still = Row { here: STILL, step: [0.0; 4] };
-        let none = GuideTurn { offset: DVec3::zeros(), least_w: 1.0 };
+        let none = GuideTurn { offset: [0.0; 3], least_w: 1.0 };
         let (mut rows, mut of_guides) = (vec![still; segments.middles.len()], vec![none; guides + 1]);
         let mut left = &mut rows[2..];
         let mut tasks = Vec::new();
@@ -236,8 +242,8 @@ impl GuideTurns {
                 let still = RootPose { translation: DVec3::zeros(), rotation: DQuat::identity(), lost: false };
                 let pose = poses.map_or(still, |poses| poses[guide]);
                 let (mine, others) = rows.split_at_mut(rows_of(starts[guide + 1] - starts[guide]));
-                of_guide.offset = write_turns(&rest[cvs.clone()], &now[cvs], &pose, mine);
-                of_guide.least_w = mine.iter().fold(1.0, |least: f64, row| least.min(row.here[0]));
+                of_guide.offset = to_f32(write_turns(&rest[cvs.clone()], &now[cvs], &pose, mine));
+                of_guide.least_w = mine.iter().fold(1.0, |least: f32, row| least.min(row.here[0]));
                 rows = others;
             }
         });
@@ -250,16 +256,22 @@ impl GuideTurns {
         &self.guides[guide as usize]
     }
 
-    /// The rotation at the place on a guide of one lane, interpolated between the middles of the guide's segments.
+    /// The rotations of all rows.
     #[inline(always)]
-    pub(super) fn at(&self, places: &LanePlaces, lane: usize) -> Turn {
-        let Row { here, step } = &self.rows[places.rows[lane] as usize];
-        let mut turn = *here;
-        for part in 0..4 {
-            turn[part] += step[part] * places.shares.0[lane];
-        }
-        turn
+    pub(super) fn rows(&self) -> &[Row] {
+        &self.rows
     }
+}
+
+/// The rotation at the place on a guide of one lane, interpolated between the middles of the guide's segments.
+#[inline(always)]
+pub(super) fn turn_at(rows: &[Row], places: &LanePlaces, lane: usize) -> Turn {
+    let Row { here, step } = &rows[places.rows[lane] as usize];
+    let mut turn = *here;
+    for part in 0..4 {
+        turn[part] += step[part] * places.shares.0[lane];
+    }
+    turn
 }
 
 /// Number of rows of a guide with so many CVs.
@@ -281,7 +293,7 @@ fn write_turns(rest: &[[f32; 3]], now: &[[f32; 3]], pose: &RootPose, rows: &mut 
             turn = smallest_rotation(&(rotated(&turn, &from)), &(back * to)) * turn;
             turn /= turn.norm();
         }
-        row.here = [turn.w, turn.i, turn.j, turn.k];
+        row.here = [turn.w, turn.i, turn.j, turn.k].map(|part| part as f32);
     }
     for k in 1..rows.len() {
         rows[k - 1].step = std::array::from_fn(|part| rows[k].here[part] - rows[k - 1].here[part]);

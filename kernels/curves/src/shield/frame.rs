@@ -136,26 +136,7 @@ const COORDINATES: usize = 3 * LANES;
 
 #[inline(always)]
 fn bounds_of_body(points: &[Vec3]) -> Bounds {
-    // As they lie in memory: those that are a multiple of three apart are along the same axis.
-    let (mut low, mut high) = ([f32::INFINITY; COORDINATES], [f32::NEG_INFINITY; COORDINATES]);
-    let (sixteens, others) = points.as_flattened().as_chunks::<COORDINATES>();
-    for coordinates in sixteens {
-        for k in 0..COORDINATES {
-            let x = coordinates[k];
-            let finite = x.abs() < f32::INFINITY;
-            low[k] = if finite & (x < low[k]) { x } else { low[k] };
-            high[k] = if finite & (x > high[k]) { x } else { high[k] };
-        }
-    }
-    let mut bounds = Bounds { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
-    for k in 0..COORDINATES {
-        bounds.add(k % 3, low[k]);
-        bounds.add(k % 3, high[k]);
-    }
-    for (k, x) in others.iter().enumerate() {
-        bounds.add(k % 3, *x);
-    }
-    bounds.or_zero()
+    Bounds::of(points)
 }
 
 /// Smallest and largest coordinates; both 0 without points.
@@ -170,12 +151,50 @@ impl Bounds {
     #[inline(always)]
     fn of(points: &[Vec3]) -> Self {
         let mut bounds = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
-        for point in points {
+        // As they lie in memory: those that are a multiple of three apart are along the same axis.
+        let (sixteens, others) = points.as_flattened().as_chunks::<COORDINATES>();
+        if !sixteens.is_empty() {
+            bounds = Self::of_sixteens(sixteens);
+        }
+        for point in others.as_chunks::<3>().0 {
             for axis in 0..3 {
                 bounds.add(axis, point[axis]);
             }
         }
         bounds.or_zero()
+    }
+
+    #[inline(always)]
+    fn of_sixteens(sixteens: &[[f32; COORDINATES]]) -> Self {
+        let (mut low, mut high) = ([f32::INFINITY; COORDINATES], [f32::NEG_INFINITY; COORDINATES]);
+        for coordinates in sixteens {
+            for k in 0..COORDINATES {
+                let x = coordinates[k];
+                let finite = x.abs() < f32::INFINITY;
+                low[k] = if finite & (x < low[k]) { x } else { low[k] };
+                high[k] = if finite & (x > high[k]) { x } else { high[k] };
+            }
+        }
+        // Halves, quarters…, each of a multiple of three.
+        let (mut eight, mut four, mut two) = ([[0.0; 24]; 2], [[0.0; 12]; 2], [[0.0; 6]; 2]);
+        for k in 0..24 {
+            eight[0][k] = lesser(low[k], low[k + 24]);
+            eight[1][k] = larger(high[k], high[k + 24]);
+        }
+        for k in 0..12 {
+            four[0][k] = lesser(eight[0][k], eight[0][k + 12]);
+            four[1][k] = larger(eight[1][k], eight[1][k + 12]);
+        }
+        for k in 0..6 {
+            two[0][k] = lesser(four[0][k], four[0][k + 6]);
+            two[1][k] = larger(four[1][k], four[1][k + 6]);
+        }
+        let mut bounds = Self { low: [0.0; 3], high: [0.0; 3] };
+        for k in 0..3 {
+            bounds.low[k] = lesser(two[0][k], two[0][k + 3]);
+            bounds.high[k] = larger(two[1][k], two[1][k + 3]);
+        }
+        bounds
     }
 
     /// Adds a coordinate, unless it is not finite.
@@ -208,6 +227,16 @@ impl Bounds {
     }
 }
 
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -234,8 +263,11 @@ mod tests {
         };
         for count in [0, 1, 2, 15, 16, 17, 100, 333] {
             let points: Vec<Vec3> = (0..count).map(|k| [3 * k, 3 * k + 1, 3 * k + 2].map(coordinate)).collect();
+            let mut each = Bounds { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
+            points.iter().for_each(|point| (0..3).for_each(|axis| each.add(axis, point[axis])));
+            let each = each.or_zero();
             for path in Path::all() {
-                assert_eq!(bounds_of(path, &points), Bounds::of(&points), "{count}");
+                assert_eq!(bounds_of(path, &points), each, "{count}");
             }
         }
     }

@@ -9,30 +9,34 @@ use numerics::tree::Cuboid;
 use numerics::vector::{Vec3, sub};
 
 kernel! { avx512
-    /// Sets `covered` to 1 for each of up to sixteen CVs that has a collider within its reach upwind.
+    /// Sets `covered` to 1 for each of up to sixteen CVs, those of `views` with the indices `cvs`, that has a collider within
+    /// its reach upwind.
     pub(super) fn cover(
         obstacles: &[Obstacle],
         views: &[View],
+        cvs: &[u32],
         covered: &mut [f32],
     ) = body;
 }
 
 kernel! { avx512
-    /// Sets `covered` for each of up to sixteen CVs to how much the nearest collider within its reach upwind counts.
+    /// Sets `covered` for each of up to sixteen CVs, those of `views` with the indices `cvs`, to how much the nearest collider
+    /// within its reach upwind counts.
     pub(super) fn cover_nearest(
         obstacles: &[Obstacle],
         views: &[View],
+        cvs: &[u32],
         fade: Fade,
         covered: &mut [f32],
     ) = body_of_nearest;
 }
 
 #[inline(always)]
-fn body(obstacles: &[Obstacle], views: &[View], covered: &mut [f32]) {
-    let mut rays = Rays::of(views, None);
+fn body(obstacles: &[Obstacle], views: &[View], cvs: &[u32], covered: &mut [f32]) {
+    let mut rays = Rays::of(views, cvs, None);
     let mut hit = [0; LANES];
     for obstacle in obstacles {
-        rays.set_gaps(views, obstacle);
+        rays.set_gaps(views, cvs, obstacle);
         if rays.meet(obstacle, &mut hit) {
             break;
         }
@@ -43,11 +47,11 @@ fn body(obstacles: &[Obstacle], views: &[View], covered: &mut [f32]) {
 }
 
 #[inline(always)]
-fn body_of_nearest(obstacles: &[Obstacle], views: &[View], fade: Fade, covered: &mut [f32]) {
-    let mut rays = Rays::of(views, Some(fade));
+fn body_of_nearest(obstacles: &[Obstacle], views: &[View], cvs: &[u32], fade: Fade, covered: &mut [f32]) {
+    let mut rays = Rays::of(views, cvs, Some(fade));
     let mut nearest = F32x16::splat(f32::INFINITY);
     for obstacle in obstacles {
-        rays.set_gaps(views, obstacle);
+        rays.set_gaps(views, cvs, obstacle);
         rays.find_nearest(obstacle, &mut nearest);
     }
     for (covered, distance) in covered.iter_mut().zip(nearest.0) {
@@ -59,10 +63,10 @@ fn body_of_nearest(obstacles: &[Obstacle], views: &[View], fade: Fade, covered: 
 /// the tree for each, but meets few triangles.
 const MANY_TRIANGLES: f32 = 160.0;
 
-/// The view of a lane.
+/// The view of a lane; that of the first where there is none.
 #[inline(always)]
-fn of_lane(views: &[View], lane: usize) -> &View {
-    if lane < views.len() { &views[lane] } else { &views[0] }
+fn of_lane<'a>(views: &'a [View], cvs: &[u32], lane: usize) -> &'a View {
+    &views[cvs[if lane < cvs.len() { lane } else { 0 }] as usize]
 }
 
 /// Sixteen rays upwind, by their starts.
@@ -77,11 +81,11 @@ struct Rays {
 impl Rays {
     /// The rays of up to sixteen CVs; a lane without a CV repeats the first.
     #[inline(always)]
-    fn of(views: &[View], fade: Option<Fade>) -> Self {
+    fn of(views: &[View], cvs: &[u32], fade: Option<Fade>) -> Self {
         let zero = F32x16::splat(0.0);
         let mut rays = Self { at: [zero; 3], gap: zero, reach: zero, farthest: 0.0 };
         for lane in 0..LANES {
-            let view = of_lane(views, lane);
+            let view = of_lane(views, cvs, lane);
             set(&mut rays.at, lane, view.at);
             let reach = Reach { end: view.reach, fade }.farthest();
             rays.reach.0[lane] = reach;
@@ -91,9 +95,9 @@ impl Rays {
     }
 
     #[inline(always)]
-    fn set_gaps(&mut self, views: &[View], obstacle: &Obstacle) {
+    fn set_gaps(&mut self, views: &[View], cvs: &[u32], obstacle: &Obstacle) {
         for lane in 0..LANES {
-            self.gap.0[lane] = of_lane(views, lane).gap.at(obstacle.size);
+            self.gap.0[lane] = of_lane(views, cvs, lane).gap.at(obstacle.size);
         }
     }
 

@@ -74,6 +74,11 @@ impl Views {
         &self.sorted
     }
 
+    /// All CVs, curve by curve.
+    pub(super) fn all(&self) -> &[View] {
+        &self.views
+    }
+
     /// The CVs with these indices, of which there is at least one; others repeat the first.
     #[inline]
     pub(super) fn group(&self, cvs: &[u32]) -> [View; LANES] {
