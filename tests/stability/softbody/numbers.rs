@@ -35,7 +35,7 @@ pub(super) fn scenes_of_any_scale_position_and_frame_rate_stay_finite() {
             ("#9: time runs a million times as fast", grounded(cube(0.02)).set("time_scale", "1e6")),
             (
                 "#41: gravity near the largest number of single precision",
-                grounded(cube(0.02)).set("gravity", "[0, -1e36, 0]"),
+                grounded(cube(0.02)).set("gravity", "[0, -1e37, 0]"),
             ),
         ],
     );
@@ -45,7 +45,7 @@ pub(super) fn scenes_of_any_scale_position_and_frame_rate_stay_finite() {
             ("features of 3 cm 1e7 m away, where single precision steps by 1 m", away(1e7), "the body has no mass"),
             (
                 "#9: steps end beyond the largest number of single precision",
-                grounded(cube(0.02)).set("time_scale", "1e30"),
+                Scene::of(cube(0.02)).set("time_scale", "1e30"),
                 "`P` of point 0 of the mesh is NaN or infinite",
             ),
         ],

@@ -11,6 +11,7 @@ use super::springs::distance;
 use super::stage::{Solved, Stage};
 use super::step::{Interval, Kinematics, StepEnd, Stepper, deepest, sum};
 use numerics::vector::DVec3;
+use std::ops::Range;
 
 /// Rounds of contact detection in a step.
 const MOST_ROUNDS: u32 = 4;
@@ -41,7 +42,7 @@ impl Stepper<'_> {
         contacts.find(&ContactQuery { from: &from, to: &to, times }, &mut found);
         let scale = ContactScale {
             seconds: self.seconds,
-            gravity: self.context.external.at(times[1]).gravity.norm(),
+            gravity: self.context.external.at(times[1]).gravity.norm().min(FAR * body.size / (h * h)),
             particle_stiffness: &self.solver.particle_stiffness,
             heaps: &self.solver.heaps,
         };
@@ -97,12 +98,20 @@ impl Stepper<'_> {
         self.context.external.hold(times[1], &mut x, &mut z, h);
         let volumes = self.solver.volumes.at(self.context.body, &z);
         self.solver.set_step_start(&self.context, h, |first, second| distance(&z, first, second), volumes);
-        let stage = Stage::new(self.context, [&y, &z], h, times[1]);
-        let scale = self.scale(&stage, &start.x, contacts, h);
-        let mut solved = Solved::default();
+        let (mut solved, mut scale) = (Solved::default(), 0.0);
         self.solver.hurried = self.is_spent();
         let most_rounds = if self.solver.hurried { 1 } else { MOST_ROUNDS };
         for round in 1..=most_rounds {
+            let stopped = self.stopped(&y, contacts, times[1], h);
+            let mut stage = Stage::new(self.context, [&y, &z], h, times[1]);
+            if let Some((y, gravity)) = &stopped {
+                (stage.y, stage.now.gravity) = (y, *gravity);
+            }
+            let fell = if round > 1 { self.set_back(&start.x, contacts, &mut x) } else { true };
+            if fell {
+                scale = self.scale(&stage, &start.x, contacts, h);
+                (solved.first, solved.enough) = (0.0, 0.0);
+            }
             let again = self.solver.descend(&stage, contacts, scale, &solved, &mut x);
             solved = Solved { residual: again.residual, ..sum(solved, again) };
             let (mut found, missed) = self.find_missed(contacts, step, &x);
@@ -174,18 +183,61 @@ impl Stepper<'_> {
                 contact.shift(missing, held, &mut out);
             }
         }
-        let body = self.context.body;
-        let mut back = vec![DVec3::zeros(); body.order.pieces.len()];
-        for contact in contacts.iter().filter(|contact| !contact.is_two_sided()) {
-            let (depth, piece) = (-contact.clearance(&out, 0.0), body.layout.piece_of(contact.particles[0] as usize));
-            if depth > FAR * body.size && depth > back[piece].norm() {
-                back[piece] = contact.normal * depth;
-            }
-        }
-        for (piece, back) in body.order.pieces.iter().zip(back).filter(|piece| piece.1 != DVec3::zeros()) {
-            body.particles(piece).filter(|particle| !held[*particle]).for_each(|particle| out[particle] += back);
+        for (piece, way) in self.far_below(contacts, &out, DVec3::zeros()) {
+            let Some(way) = way else { continue };
+            piece.filter(|particle| !held[*particle]).for_each(|particle| out[particle] += way);
         }
         out
+    }
+
+    /// The particles of each piece, and the way out of the obstacle in which it is deepest once moved from `x` on `by` that, if
+    /// it is more than `FAR`.
+    fn far_below(&self, contacts: &[ContactConstraint], x: &[DVec3], by: DVec3) -> Vec<(Range<usize>, Option<DVec3>)> {
+        let body = self.context.body;
+        let mut pieces: Vec<_> = body.order.pieces.iter().map(|piece| (body.particles(piece), None)).collect();
+        for contact in contacts.iter().filter(|contact| !contact.is_two_sided()) {
+            let depth = -contact.clearance(x, 0.0) - contact.normal.dot(&by);
+            let (_, way) = &mut pieces[body.layout.piece_of(contact.particles[0] as usize)];
+            if depth > FAR * body.size && way.is_none_or(|way: DVec3| depth > way.norm()) {
+                *way = Some(contact.normal * depth);
+            }
+        }
+        pieces
+    }
+
+    /// Sets pieces that fell more than `FAR` into an obstacle, which was not known yet, to where they `were`; returns whether
+    /// there are any.
+    fn set_back(&self, were: &[DVec3], contacts: &[ContactConstraint], x: &mut [DVec3]) -> bool {
+        let mut any = false;
+        let far = self.far_below(contacts, x, DVec3::zeros());
+        for (piece, _) in far.into_iter().filter(|piece| piece.1.is_some()) {
+            any = true;
+            for particle in piece.filter(|particle| !self.context.external.held[*particle]) {
+                x[particle] = were[particle];
+            }
+        }
+        any
+    }
+
+    /// The predicted positions `y` of a step of `h` that ends at `time`, and gravity in it, where these would take a piece to
+    /// more than `FAR` in an obstacle: each of them is limited to that. The obstacle stops the piece all the same, and rounding of
+    /// such distances is larger than bodies are.
+    fn stopped(&self, y: &[DVec3], contacts: &[ContactConstraint], time: f64, h: f64) -> Option<(Vec<DVec3>, DVec3)> {
+        let (most, gravity) = (FAR * self.context.body.size, self.context.external.at(time).gravity);
+        let falls = gravity * (h * h);
+        let [ways, stopped] = [DVec3::zeros(), falls].map(|by| self.far_below(contacts, y, by));
+        if stopped.iter().all(|piece| piece.1.is_none()) {
+            return None;
+        }
+        let (mut out, part) = (y.to_vec(), (most / falls.norm()).min(1.0));
+        for ((piece, way), (_, stopped)) in ways.into_iter().zip(stopped) {
+            let more = match stopped {
+                None => falls * (1.0 - part),
+                Some(_) => way.map_or(DVec3::zeros(), |way| way - way.normalize() * most),
+            };
+            out[piece].iter_mut().for_each(|out| *out += more);
+        }
+        Some((out, gravity * part))
     }
 }
 
