@@ -232,8 +232,10 @@ impl Hair<'_> {
         nearby: &mut Nearby<'t>,
         reached: &mut Reached,
     ) -> DVec3 {
-        let root = to_f64(self.rest[0]) + self.shift;
-        let is_free = self.half_space.is_some_and(|half_space| half_space.frees(&root, segment));
+        let is_free = match self.half_space {
+            Some(half_space) => half_space.frees(&(to_f64(self.rest[0]) + self.shift), segment),
+            None => false,
+        };
         // One call for both attempts: what is inlined here is most of the kernel, and compiled once.
         let mut wary: Option<Segment<'_>> = None;
         let (turned, end) = loop {
@@ -243,8 +245,10 @@ impl Hair<'_> {
             };
             let keeps_goal = wary.is_none() && !turned.met && may_keep_goal && self.out[k] == self.goal[k];
             let end = if keeps_goal { self.goal[k + 1] } else { segment.end(&turned.direction) };
-            let start = segment.start(&turned.direction);
-            let crossing = if turned.clear { None } else { first_crossing(nearby.blocks(), start, end) };
+            let crossing = match turned.clear {
+                true => None,
+                false => first_crossing(nearby.blocks(), segment.start(&turned.direction), end),
+            };
             if crossing.is_some() && wary.is_none() {
                 wary = Some(segment.wary());
                 continue;
