@@ -255,6 +255,25 @@ pub(crate) fn memory(extent: Extent, table: &mut Table) {
     table.add(format!("{}, peak memory", case.name()), cost.peak, Some(MEMORY), " MB", cost.beside());
 }
 
+/// The volume that the block's splash loses or gains without correction, by how fine its surface and its substeps are.
+pub(crate) fn volume(extent: Extent, table: &mut Table) {
+    let (cells, last) = extent.choose((24.0, 18), (32.0, 40));
+    let engine = Engine::new(&Settings { threads: 2, ..Settings::default() }).expect("threads");
+    for (resolution, cfl) in [(1, 2.0), (1, 1.0), (2, 2.0), (2, 1.0), (3, 1.0)] {
+        let more = format!(r#", "volume_correction": false, "resolution": {resolution}, "cfl": {cfl}"#);
+        let report = cook(&engine, &graph(Scene::Block, cells, 0.0, &more, last), last);
+        let drift = metric(&report, "volume_drift_raw");
+        let worst = drift.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or_default();
+        table.add(
+            format!("block, {cells}³ cells, `resolution` {resolution}, `cfl` {cfl}: worst volume in {last} frames"),
+            100.0 * worst,
+            None,
+            " %",
+            format!("{:.0} ms a frame", report.cooking.as_secs_f64() * 1e3 / (last - 1) as f64),
+        );
+    }
+}
+
 /// The argument before a case that makes this program a child process of [`Case::run`].
 pub(crate) const CHILD: &str = "cook-a-case";
 
@@ -264,17 +283,14 @@ pub(crate) fn cook_as_child(case: &str) {
     let number = |name: &str| case[name].as_f64().expect("a number of a case");
     let scene = Scene::ALL.into_iter().find(|scene| case["scene"] == scene.name()).expect("a scene");
     let (threads, last) = (number("threads") as usize, number("last") as i64);
-    let graph = graph(scene, number("cells"), number("viscosity"), last);
+    let graph = graph(scene, number("cells"), number("viscosity"), "", last);
     let cooked = |last| {
         let engine = Engine::new(&Settings { threads, ..Settings::default() }).expect("threads");
         cook(&engine, &graph, last)
     };
     let (start, all) = (cooked(1), cooked(last));
     let frames = (last - 1) as f64;
-    let metric = |name: &str| -> Vec<f64> {
-        let values = all.nodes.iter().find_map(|node| node.metrics.get(name)).expect("a metric of FluidSolve");
-        values.iter().filter(|(frame, _)| **frame > Frame::whole(1)).map(|(_, value)| *value).collect()
-    };
+    let metric = |name: &str| metric(&all, name);
     let sum = |name: &str| metric(name).iter().sum::<f64>();
     let substeps = sum("substeps_used");
     let milliseconds = |report: &Report| report.cooking.as_secs_f64() * 1e3;
@@ -293,6 +309,12 @@ pub(crate) fn cook_as_child(case: &str) {
     println!("{found}");
 }
 
+/// A metric of FluidSolve in the frames after the first.
+fn metric(report: &Report, name: &str) -> Vec<f64> {
+    let values = report.nodes.iter().find_map(|node| node.metrics.get(name)).expect("a metric of FluidSolve");
+    values.iter().filter(|(frame, _)| **frame > Frame::whole(1)).map(|(_, value)| *value).collect()
+}
+
 fn cook(engine: &Engine, graph: &Graph, last: i64) -> Report {
     let request = Request { outputs: vec![0], frames: (1..=last).map(Frame::whole).collect() };
     let mut sink = |_: &[Delivered]| -> Result<(), Infallible> { Ok(()) };
@@ -301,8 +323,8 @@ fn cook(engine: &Engine, graph: &Graph, last: i64) -> Report {
     report
 }
 
-/// FluidSolve with the liquid of a scene.
-fn graph(scene: Scene, cells: f64, viscosity: f64, last: i64) -> Graph {
+/// FluidSolve with the liquid of a scene; `more`: other params, after a comma.
+fn graph(scene: Scene, cells: f64, viscosity: f64, more: &str, last: i64) -> Graph {
     let liquid = scene.liquid();
     let names: Vec<String> = (0..liquid.len()).map(|n| format!("liquid{n}")).collect();
     let given: String = names.iter().map(|name| format!(r#""{name}": {{ "type": "Mesh_Primitive" }},"#)).collect();
@@ -316,7 +338,7 @@ fn graph(scene: Scene, cells: f64, viscosity: f64, last: i64) -> Graph {
                     "type": "FluidSolve",
                     "inputs": {{ "liquid": {names:?} }},
                     "params": {{
-                        "cell": {}, "domain_from": [0, 0, 0], "domain_to": [1, 1, 1], "viscosity": {viscosity}{}
+                        "cell": {}, "domain_from": [0, 0, 0], "domain_to": [1, 1, 1], "viscosity": {viscosity}{}{more}
                     }}
                 }}
             }},

@@ -1,5 +1,5 @@
 //! What liquids cost, each beside the figure asked for: `cargo bench --bench liquid`, or `-- frames box growth threads memory
-//! pressure surface tracking` for some of the parts; `--quick` for coarse grids and few frames.
+//! volume pressure surface tracking` for some of the parts; `--quick` for coarse grids and few frames.
 //!
 //! Frames are those of FluidSolve with its surface, 1/24 s each, cooked by a child process of two threads whose peak memory
 //! is read. A frame is the mean of the frames after the first. Where a run is short it is the least of several, interleaved.
@@ -43,12 +43,13 @@ impl Extent {
 /// Measures a part.
 type Measure = fn(Extent, &mut Table);
 
-const PARTS: [(&str, Measure); 8] = [
+const PARTS: [(&str, Measure); 9] = [
     ("frames", frames::blocks),
     ("box", frames::share_of_box),
     ("growth", frames::growth),
     ("threads", frames::threads),
     ("memory", frames::memory),
+    ("volume", frames::volume),
     ("pressure", pressure::solves),
     ("surface", surface::extraction),
     ("tracking", surface::tracking),

@@ -120,6 +120,13 @@ pub fn largest(a: Vec3) -> f32 {
     if xy > z { xy } else { z }
 }
 
+/// Whether no coordinate is NaN or infinite.
+#[inline(always)]
+pub fn are_finite(points: &[Vec3]) -> bool {
+    // Without a branch between them, which the compiler would not vectorise.
+    points.as_flattened().iter().fold(true, |finite, x| finite & x.is_finite())
+}
+
 /// The power of two that scales a `magnitude` ≥ 0 to 1…2 (denormals to less than 1, magnitudes above 2¹²⁶ to at most 4),
 /// and its inverse, both exact.
 #[inline(always)]

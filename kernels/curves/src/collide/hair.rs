@@ -10,7 +10,7 @@ use super::{Collide, Reached, perpendicular};
 use nalgebra::Quaternion;
 use numerics::masked::Masked;
 use numerics::tree::TriangleTree;
-use numerics::vector::{self, DQuat, DVec3, Vec3, to_f32, to_f64};
+use numerics::vector::{self, DQuat, DVec3, Vec3, are_finite, to_f32, to_f64};
 
 /// Length, in gaps, at the start of the first segment that is not tested if the root may lie on the skin.
 pub(super) const SKIPPED_GAPS: f64 = 5.0;
@@ -285,9 +285,7 @@ impl Hair<'_> {
     }
 
     fn is_finite(&self) -> bool {
-        // Without a branch between them, which the compiler would not vectorise.
-        let finite = |cvs: &[Vec3]| cvs.as_flattened().iter().fold(true, |finite, x| finite & x.is_finite());
-        finite(self.goal) & finite(self.rest)
+        are_finite(self.goal) & are_finite(self.rest)
     }
 
     /// The CVs' goals: the input, or kept off the skin by a share of their rest heights.

@@ -24,7 +24,7 @@ use numerics::masked::Masked;
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
 use numerics::tree::{Cuboid, Region, TriangleTree};
-use numerics::vector::{self, DVec3, Vec3, to_f32, to_f64};
+use numerics::vector::{self, DVec3, Vec3, are_finite, to_f32, to_f64};
 use settle::{Entered, settle};
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -327,7 +327,7 @@ fn look_up_task(curves: Range<usize>, starts: &[u32], how: &KeepOut<'_>, out: &m
         rest.resize(cvs.len(), [0.0; 3]);
         let root = to_f32(how.root(curve, cvs.start));
         how.write_rest(curve, cvs, root, &mut rest);
-        if rest.len() >= 2 && is_finite(&rest) {
+        if rest.len() >= 2 && are_finite(&rest) {
             *out = HalfSpace::of(&rest, &DVec3::zeros(), 0.0, how.gap, &collision);
         }
     }
@@ -408,7 +408,7 @@ fn entering_task(
     for (curve, may_meet) in curves.zip(may_meet) {
         let cvs = starts[curve] as usize..starts[curve + 1] as usize;
         let now = &points[cvs.clone()];
-        if *may_meet == 0 || now.len() < 2 || !is_finite(now) {
+        if *may_meet == 0 || now.len() < 2 || !are_finite(now) {
             continue;
         }
         let (first, tree) = ([now[0], now[1]], how.skin.tree);
@@ -434,11 +434,6 @@ fn entering_task(
         }
     }
     entered
-}
-
-fn is_finite(cvs: &[Vec3]) -> bool {
-    // Without a branch between them, which the compiler would not vectorise.
-    cvs.as_flattened().iter().fold(true, |finite, x| finite & x.is_finite())
 }
 
 /// Rounding of positions up to this size and length.

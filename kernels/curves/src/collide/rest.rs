@@ -8,7 +8,7 @@ use super::root_surface::RootSurface;
 use super::segment_turn::{Nearby, gather};
 use numerics::parallel;
 use numerics::simd::{Path, kernel};
-use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
+use numerics::vector::{DVec3, Vec3, are_finite, to_f32, to_f64};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -174,7 +174,7 @@ fn grow_task(ends: &[u32], rest: &[Vec3], how: &Collide<'_>, grown: &mut Grown) 
     let mut nearby = Nearby::default();
     for ends in ends.windows(2) {
         let cvs = &rest[ends[0] as usize..ends[1] as usize];
-        let is_whole = cvs.len() >= 2 && cvs.as_flattened().iter().all(|x| x.is_finite());
+        let is_whole = cvs.len() >= 2 && are_finite(cvs);
         let (mut shift, mut is_low, mut around) = (DVec3::zeros(), false, None);
         if let Some(skin) = how.skin.as_ref().filter(|_| is_whole) {
             let lifted = skin.lift(cvs[0], how.offset_root_at(ends[0] as usize));
@@ -206,7 +206,7 @@ kernel! { avx512
 fn look_up_task(ends: &[u32], rest: &[Vec3], how: &Collide<'_>, shifts: &[DVec3], out: &mut [HalfSpace]) {
     for (k, out) in out.iter_mut().enumerate() {
         let cvs = ends[k] as usize..ends[k + 1] as usize;
-        if cvs.len() >= 2 && rest[cvs.clone()].as_flattened().iter().all(|x| x.is_finite()) {
+        if cvs.len() >= 2 && are_finite(&rest[cvs.clone()]) {
             let width = cvs.clone().fold(0.0, |most: f32, cv| most.max(how.width.at(cv)));
             *out = HalfSpace::of(&rest[cvs.clone()], &shifts[k], f64::from(width), how.gap_at(cvs.start), how);
         }

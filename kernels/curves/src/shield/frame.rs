@@ -128,16 +128,11 @@ fn write_framed_body(frame: &Frame, points: &[Vec3], framed: &mut [Vec3]) {
 
 kernel! {
     /// [`Bounds::of`] for many points.
-    fn bounds_of(points: &[Vec3]) -> Bounds = bounds_of_body;
+    fn bounds_of(points: &[Vec3]) -> Bounds = Bounds::of;
 }
 
 /// Coordinates of sixteen points.
 const COORDINATES: usize = 3 * LANES;
-
-#[inline(always)]
-fn bounds_of_body(points: &[Vec3]) -> Bounds {
-    Bounds::of(points)
-}
 
 /// Smallest and largest coordinates; both 0 without points.
 #[derive(Debug, PartialEq)]

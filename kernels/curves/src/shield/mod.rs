@@ -178,19 +178,13 @@ pub fn shield_on(
         let tasks = covered.chunks_mut(TASK_GROUPS * LANES).zip(views.sorted().chunks(TASK_GROUPS * LANES));
         parallel::for_each(tasks, |_, (covered, cvs)| {
             for (covered, cvs) in covered.chunks_mut(LANES).zip(cvs.chunks(LANES)) {
+                let group = || views.group(cvs);
                 match fade {
                     None if shield.cone > 0.0 => {
-                        cone::cover(path, &obstacles, &views.group(cvs)[..cvs.len()], shield.cone, covered);
+                        cone::cover(path, &obstacles, &group()[..cvs.len()], shield.cone, covered);
                     }
                     Some(fade) if shield.cone > 0.0 => {
-                        cone::cover_fading(
-                            path,
-                            &obstacles,
-                            &views.group(cvs)[..cvs.len()],
-                            fade,
-                            shield.cone,
-                            covered,
-                        );
+                        cone::cover_fading(path, &obstacles, &group()[..cvs.len()], fade, shield.cone, covered);
                     }
                     None => rays::cover(path, &obstacles, views.all(), cvs, covered),
                     Some(fade) => rays::cover_nearest(path, &obstacles, views.all(), cvs, fade, covered),
