@@ -136,7 +136,8 @@ impl BodySkin {
     /// The elements released by obstacles with particles at `x`.
     pub(super) fn released(&self, x: &[[f64; 3]]) -> ReleasedElements {
         let surface = &self.surface;
-        let edges: Vec<bool> = surface.edges.iter().map(|edge| self.is_overstretched(edge, x)).collect();
+        let is_long = |edge: &Edge| edge_length(edge, x) > LONG * edge_length(edge, &self.rest).max(self.mean);
+        let edges: Vec<bool> = surface.edges.iter().map(is_long).collect();
         if !edges.contains(&true) {
             return ReleasedElements::default();
         }
@@ -175,11 +176,7 @@ impl BodySkin {
     /// Number of edges released by obstacles with particles at `x`: those more than eight times as long as at rest
     /// and as the skin's mean edge.
     pub fn released_edges(&self, x: &[[f64; 3]]) -> usize {
-        self.surface.edges.iter().filter(|edge| self.is_overstretched(edge, x)).count()
-    }
-
-    fn is_overstretched(&self, edge: &Edge, x: &[[f64; 3]]) -> bool {
-        edge_length(edge, x) > LONG * edge_length(edge, &self.rest).max(self.mean)
+        self.released(x).edges.iter().filter(|released| **released).count()
     }
 
     /// Distance of two edges at rest, metres.

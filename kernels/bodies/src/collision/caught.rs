@@ -55,7 +55,7 @@ impl CollisionScene<'_> {
                     }
                 });
                 self.add_severed((index, obstacle), to, &mut own);
-                if 2 * self.beyond(obstacle, to, &own) <= skin.touching.len() {
+                if !own.is_empty() && 2 * self.beyond(obstacle, to, &own) <= skin.touching.len() {
                     caught.extend(own);
                 }
             }
@@ -112,14 +112,10 @@ impl CollisionScene<'_> {
 
     /// How many of these particles are not inside an obstacle, but have come out on another side.
     fn beyond(&self, obstacle: usize, x: &[[f64; 3]], caught: &[CaughtParticle]) -> usize {
-        if caught.is_empty() {
-            return 0;
-        }
         let obstacle = &self.obstacles[obstacle];
-        let particles: Vec<u32> = caught.iter().map(|caught| caught.particle).collect();
-        let mut inside = vec![false; x.len()];
-        Enclosure::new(&obstacle.at(1.0), &obstacle.surface.triangles, 0.0).mark(x, &particles, &mut inside);
-        particles.iter().filter(|particle| !inside[**particle as usize]).count()
+        let particles = caught.iter().map(|caught| caught.particle).collect();
+        let solid = Enclosure::new(&obstacle.at(1.0), &obstacle.surface.triangles, 0.0);
+        caught.len() - solid.within(x, particles).len()
     }
 
     /// Those of an obstacle, by particle.

@@ -36,6 +36,11 @@ pub(super) struct Yielding {
 }
 
 impl Yielding {
+    /// By distances at the start and the end of a query of `seconds`.
+    pub(super) fn falling([start, end]: [f64; 2], seconds: f64) -> Self {
+        Self { by: end, speed: if seconds > 0.0 { (start - end) / seconds } else { 0.0 } }
+    }
+
     /// A contact that lets surfaces be closer by that, unless there is no room for it. Open obstacles must not be passed: there
     /// the distance to keep is smaller.
     pub(super) fn of(self, contact: Contact) -> Contact {
@@ -58,9 +63,7 @@ impl Separation<'_> {
             let [start, end] = self.grown;
             missing * (1.0 - over).max(0.0) + start + (end - start) * time
         };
-        let [start, end] = times.map(left);
-        let seconds = self.seconds * (times[1] - times[0]);
-        Yielding { by: end, speed: if seconds > 0.0 { (start - end) / seconds } else { 0.0 } }
+        Yielding::falling(times.map(left), self.seconds * (times[1] - times[0]))
     }
 }
 

@@ -26,7 +26,7 @@ mod solid;
 mod surface;
 mod vertex;
 
-use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
+use crate::mass_spring::{Contact, ContactFinder, ContactQuery, Weighted};
 pub use body_skin::BodySkin;
 use body_skin::{ReleasedElements, has};
 pub use caught::CaughtParticle;
@@ -41,6 +41,7 @@ use numerics::vector::{DVec3, to_f32};
 pub use obstacle::{Ground, Obstacle};
 pub use overlap::{Overlap, OverlapPartner, Penetration, Separation};
 pub use pair::ContactParams;
+use pair::Marks;
 use std::sync::Mutex;
 use surface::Positions;
 use vertex::{ContactRules, MovingSurface};
@@ -172,30 +173,22 @@ impl CollisionScene<'_> {
                     continue;
                 }
                 let depth = (ground.thickness - before).max(0.0);
-                let (allowed, speed) = rising.map_or((0.0, 0.0), |overlap| self.allowed(overlap, depth, query.times));
-                let contact = yielding.of(Contact {
-                    points: [*particle, 0, 0, 0],
-                    weights: [1.0, 0.0, 0.0, 0.0],
-                    normal: ground.up,
-                    offset: ground.height - allowed,
-                    gap: ground.thickness,
-                    velocity: (up * speed).into(),
-                    friction: ground.friction * self.friction_scale(&[*particle], &[1.0]),
-                    jammed: false,
-                    open: false,
-                });
+                let rising = rising.map_or(Yielding::default(), |overlap| self.allowed(overlap, depth, query.times));
+                let contact = Contact::between([(&[*particle], &[1.0]), (&[], &[])], up, ground.thickness);
+                let friction = ground.friction * self.friction_scale(&contact);
+                let contact = yielding.of(rising.of(Contact { offset: ground.height, friction, ..contact }));
                 // Contacts yield as they do with what has an inside.
                 out.push(Contact { open: true, ..contact });
             }
         }
     }
 
-    /// Factor on friction at the point with these weights.
-    fn friction_scale(&self, points: &[u32], weights: &[f64]) -> f64 {
+    /// Factor on the friction of a contact.
+    fn friction_scale(&self, contact: &Contact) -> f64 {
         let Some(mask) = self.friction else { return 1.0 };
         let of = |point: &u32| mask.get(*point as usize).map_or(1.0, |scale| f64::from(*scale));
         let (mut sum, mut whole) = (0.0, 0.0);
-        for (point, weight) in points.iter().zip(weights).filter(|side| *side.1 != 0.0) {
+        for (point, weight) in contact.points.iter().zip(contact.weights).filter(|side| side.1 != 0.0) {
             sum += of(point) * weight.abs();
             whole += weight.abs();
         }
@@ -272,16 +265,25 @@ struct SkinObstaclePair<'a> {
     yielding: Yielding,
 }
 
-/// Adds the contacts of some things to a list, with buffers that another task may have used before.
-type FindIn<'a, S> = dyn Fn(&mut S, &[u32], &mut Vec<Contact>) + Sync + 'a;
+/// Buffers of a task, which another may have used before.
+#[derive(Default)]
+struct Scratch {
+    others: Vec<u32>,
+    path: Vec<DVec3>,
+    marks: Marks,
+}
 
-/// Collects the contacts of `things` in their order, for any number of threads.
-fn collect_in_order<S: Default + Send>(things: &[u32], find_in: &FindIn<'_, S>, out: &mut Vec<Contact>) {
-    let unused: Mutex<Vec<S>> = Mutex::default();
+/// Collects the contacts that `find` adds for each of `things` in their order, for any number of threads.
+fn collect_in_order(
+    things: &[u32],
+    out: &mut Vec<Contact>,
+    find: impl Fn(u32, &mut Scratch, &mut Vec<Contact>) + Sync,
+) {
+    let unused: Mutex<Vec<Scratch>> = Mutex::default();
     let lock = || unused.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let parts = parallel::map(things.chunks(TASK), |_, things| {
         let (mut scratch, mut seen) = (lock().pop().unwrap_or_default(), Vec::new());
-        find_in(&mut scratch, things, &mut seen);
+        things.iter().for_each(|thing| find(*thing, &mut scratch, &mut seen));
         lock().push(scratch);
         seen
     });
@@ -300,26 +302,23 @@ impl SkinObstaclePair<'_> {
         let bounds = tree.bounds;
         // Made before the loop: a thread of the pool that waits for another's tree could wait forever.
         let solid = self.solid_at_start(&bounds);
-        let find_in = |(): &mut (), particles: &[u32], out: &mut Vec<Contact>| {
-            let (mut faces, mut path) = (Vec::new(), Vec::new());
-            for particle in particles.iter().filter(|particle| !has(&self.released.particles, **particle)) {
-                tree.overlapping(&self.boxes[0][*particle as usize], &mut faces);
-                let own = &self.boxes[0][*particle as usize];
-                let entry = self.entry(*particle);
-                if faces.is_empty() && entry.is_none() && !(solid.is_some() && swept::overlap(own, &bounds)) {
-                    continue;
-                }
-                path_of(self.body.poses, *particle, &mut path);
-                let start = path[0];
-                let closest_at_start = || self.closest_at_start(solid.as_ref()?, &bounds, start);
-                for hit in vertex::hits(&path, &self.still, (&faces, entry), &closest_at_start, &self.rules) {
-                    let corners = self.obstacle.surface.triangles[hit.face as usize];
-                    let first = ([*particle, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]);
-                    out.push(self.contact(first, (&corners, &hit.weights), hit.normal, hit.shift));
-                }
+        collect_in_order(&self.skin.touching, out, |particle, Scratch { others: faces, path, .. }, out| {
+            if has(&self.released.particles, particle) {
+                return;
             }
-        };
-        collect_in_order(&self.skin.touching, &find_in, out);
+            let (own, entry) = (&self.boxes[0][particle as usize], self.entry(particle));
+            tree.overlapping(own, faces);
+            if faces.is_empty() && entry.is_none() && !(solid.is_some() && swept::overlap(own, &bounds)) {
+                return;
+            }
+            path_of(self.body.poses, particle, path);
+            let closest_at_start = || self.closest_at_start(solid.as_ref()?, &bounds, path[0]);
+            for hit in vertex::hits(path, &self.still, (faces, entry), &closest_at_start, &self.rules) {
+                let corners = &self.obstacle.surface.triangles[hit.face as usize];
+                let sides = [(&[particle][..], &[1.0][..]), (corners, &hit.weights)];
+                out.push(self.contact(sides, hit.normal, hit.shift));
+            }
+        });
     }
 
     /// The obstacle's triangles at the start of the motion, where it has an inside and a particle may be in it: within
@@ -348,72 +347,56 @@ impl SkinObstaclePair<'_> {
 
     /// Sharp points of the obstacle against triangles of the skin.
     fn points(&self, tree: &SweptBoxTree<'_>, out: &mut Vec<Contact>) {
-        let find_in = |(): &mut (), points: &[u32], out: &mut Vec<Contact>| {
-            let (mut faces, mut path) = (Vec::new(), Vec::new());
-            for point in points {
-                let region = swept::inflated(&self.boxes[1][*point as usize], self.rules.reach);
-                tree.overlapping(&region, &mut faces);
-                faces.retain(|face| !has(&self.released.faces, *face));
-                if faces.is_empty() {
-                    continue;
-                }
-                path_of(self.still.poses, *point, &mut path);
-                for hit in vertex::hits(&path, &self.body, (&faces, None), &|| None, &self.rules) {
-                    let [a, b, c] = self.skin.surface.triangles[hit.face as usize];
-                    let [u, v, w] = hit.weights;
-                    let first = ([a, b, c, 0], [u, v, w, 0.0]);
-                    out.push(self.contact(first, (&[*point], &[1.0]), -hit.normal, hit.shift));
-                }
+        collect_in_order(&self.obstacle.sharp_points, out, |point, Scratch { others: faces, path, .. }, out| {
+            tree.overlapping(&swept::inflated(&self.boxes[1][point as usize], self.rules.reach), faces);
+            faces.retain(|face| !has(&self.released.faces, *face));
+            if faces.is_empty() {
+                return;
             }
-        };
-        collect_in_order(&self.obstacle.sharp_points, &find_in, out);
+            path_of(self.still.poses, point, path);
+            for hit in vertex::hits(path, &self.body, (faces, None), &|| None, &self.rules) {
+                let corners = &self.skin.surface.triangles[hit.face as usize];
+                let sides = [(&corners[..], &hit.weights[..]), (&[point], &[1.0])];
+                out.push(self.contact(sides, -hit.normal, hit.shift));
+            }
+        });
     }
 
     /// Edges of the skin against sharp edges of the obstacle.
     fn edges(&self, out: &mut Vec<Contact>) {
         let tree = self.obstacle.edges.sweep(self.boxes[1], self.rules.reach);
         let indices: Vec<u32> = (0..self.skin.surface.edges.len() as u32).collect();
-        let find_in = |(): &mut (), edges: &[u32], out: &mut Vec<Contact>| {
-            let mut others = Vec::new();
-            for index in edges.iter().filter(|edge| !has(&self.released.edges, **edge)) {
-                let edge = &self.skin.surface.edges[*index as usize];
-                tree.overlapping(&swept::bounds_of(&edge.ends, self.boxes[0]), &mut others);
-                for other in &others {
-                    let other = &self.obstacle.surface.edges[self.obstacle.sharp_edges[*other as usize] as usize];
-                    if let Some(hit) = edge::hit([&self.body, &self.still], [edge, other], &self.rules) {
-                        let [s, t] = hit.shares;
-                        let first = ([edge.ends[0], edge.ends[1], 0, 0], [1.0 - s, s, 0.0, 0.0]);
-                        out.push(self.contact(first, (&other.ends, &[1.0 - t, t]), hit.normal, 0.0));
-                    }
+        collect_in_order(&indices, out, |index, Scratch { others, .. }, out| {
+            if has(&self.released.edges, index) {
+                return;
+            }
+            let edge = &self.skin.surface.edges[index as usize];
+            tree.overlapping(&swept::bounds_of(&edge.ends, self.boxes[0]), others);
+            for other in others {
+                let other = &self.obstacle.surface.edges[self.obstacle.sharp_edges[*other as usize] as usize];
+                if let Some(hit) = edge::hit([&self.body, &self.still], [edge, other], &self.rules) {
+                    let sides = [(&edge.ends[..], &hit.weights[0][..]), (&other.ends, &hit.weights[1])];
+                    out.push(self.contact(sides, hit.normal, 0.0));
                 }
             }
-        };
-        collect_in_order(&indices, &find_in, out);
+        });
     }
 
     /// A contact of points of the body with points of the obstacle, which counts as stopped above the ground.
-    fn contact(
-        &self,
-        (own, weights): ([u32; 4], [f64; 4]),
-        (points, shares): (&[u32], &[f64]),
-        normal: DVec3,
-        shift: f64,
-    ) -> Contact {
+    fn contact(&self, [own, (points, shares)]: [Weighted<'_>; 2], normal: DVec3, shift: f64) -> Contact {
         let (gap, times) = (self.rules.gap, self.query.times);
         let touched = [self.still.start(), self.still.end()].map(|at| at.weighted(points, shares));
         let [raised, raised_end] = touched.map(|touched| self.scene.raised(touched, normal, gap));
         let seconds = self.obstacle.seconds * (times[1] - times[0]);
         let stopping = if seconds > 0.0 { (raised_end - raised) / seconds } else { DVec3::zeros() };
+        let contact = Contact::between([own, (&[], &[])], normal, gap);
         self.yielding.of(Contact {
-            points: own,
-            weights,
-            normal: normal.into(),
             offset: normal.dot(&(touched[1] + raised_end)) - shift,
-            gap,
             velocity: (self.obstacle.velocity_of(times[1], points, shares) + stopping).into(),
-            friction: self.obstacle.friction * self.scene.friction_scale(&own, &weights),
+            friction: self.obstacle.friction * self.scene.friction_scale(&contact),
             jammed: -normal.dot(&raised_end) > JAMMED * gap,
             open: !self.obstacle.surface.closed,
+            ..contact
         })
     }
 }

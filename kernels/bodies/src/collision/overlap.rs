@@ -12,15 +12,13 @@
 //! Limit: bodies of which only edges cross, with no point of one inside the other, are not pushed apart;
 //! [`CollisionScene::crossings`] finds them.
 
-use super::obstacle::narrow;
 use super::solid::Solid;
 use super::surface::{Moment, TriangleSurface};
-use super::{BodySkin, Closeness, CollisionScene, Obstacle};
-use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
+use super::{Closeness, CollisionScene, ContactParams, Obstacle, Yielding};
+use crate::mass_spring::{Contact, ContactFinder, ContactQuery, Weighted};
 use crate::tets::{Enclosure, Exit};
 use numerics::closest_point::ClosestPoint;
 use numerics::swept;
-use numerics::tree::TriangleTree;
 use numerics::vector::DVec3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -236,93 +234,79 @@ impl CollisionScene<'_> {
         self.separated().iter().find(|overlap| overlap.skin == skin && overlap.partner == partner)
     }
 
-    /// The depth below its gap that a point may have at the end of the query, if it has `depth` at its start, and the
-    /// speed at which it falls, m/s.
-    pub(super) fn allowed(&self, overlap: &Overlap, depth: f64, times: [f64; 2]) -> (f64, f64) {
-        let Some(separation) = self.separation else { return (0.0, 0.0) };
+    /// How contacts yield at the end of the query for a point that has this `depth` below its gap at the start.
+    pub(super) fn allowed(&self, overlap: &Overlap, depth: f64, times: [f64; 2]) -> Yielding {
+        let Some(separation) = self.separation else { return Yielding::default() };
         let (whole, passed) = (f64::from(separation.frames), times[1] - times[0]);
         let left = whole - f64::from(separation.over) - times[0];
         let even = depth - overlap.depth * passed / whole;
         let allowed = even.min(depth * (1.0 - passed / left)).max(0.0);
-        let seconds = separation.seconds * passed;
-        (allowed, if seconds > 0.0 { (depth - allowed) / seconds } else { 0.0 })
+        Yielding::falling([depth, allowed], separation.seconds * passed)
     }
 
     /// Contacts of the pairs that are being pushed apart; returns what is pushed out of obstacles.
     pub(super) fn separate(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) -> Pushed {
         let mut pushed = Pushed::new();
         for overlap in self.separated() {
+            let of_skin = |skin: usize, gap: f64| {
+                let skin = &self.skins[skin];
+                Side::new(query.from, &skin.touching, &skin.surface, [gap, 0.0])
+            };
             match overlap.partner {
                 OverlapPartner::Ground => {}
-                OverlapPartner::Obstacle(obstacle) => {
-                    let particles = self.out_of_obstacle(query, overlap, &self.obstacles[obstacle], out);
-                    pushed.insert((overlap.skin, obstacle), particles);
+                OverlapPartner::Obstacle(index) => {
+                    let obstacle = &self.obstacles[index];
+                    let gap = obstacle.thickness;
+                    let [start, end] = query.times.map(|time| obstacle.at(time));
+                    let solid = Side::new(&start, &obstacle.surface.vertices, &obstacle.surface, [gap, 0.0]);
+                    let sides = [&of_skin(overlap.skin, gap), &solid];
+                    let particles = self.push_out(query, overlap, sides, gap, Some((obstacle, &end)), out);
+                    pushed.insert((overlap.skin, index), particles);
                 }
-                OverlapPartner::Skin(index) => self.out_of_skin(query, overlap, &self.skins[index], out),
+                OverlapPartner::Skin(index) => {
+                    let Some(ContactParams { thickness: gap, .. }) = self.body_contact else { continue };
+                    let sides = [&of_skin(overlap.skin, gap), &of_skin(index, gap)];
+                    self.push_out(query, overlap, sides, gap, None, out);
+                }
             }
         }
         pushed
     }
 
-    /// The contact of points with these weights, without friction, that allows the depth of an `exit` from what is at rest
-    /// at the origin, and pushes along `normal`.
-    fn pushing(
-        &self,
-        (query, overlap, gap): (&ContactQuery<'_>, &Overlap, f64),
-        exit: &Exit,
-        (points, weights): ([u32; 4], [f64; 4]),
-        normal: DVec3,
-    ) -> Contact {
-        let (allowed, speed) = self.allowed(overlap, exit.distance + gap, query.times);
-        let (velocity, normal) = ((normal * speed).into(), normal.into());
-        Contact { points, weights, normal, offset: -allowed, gap, velocity, friction: 0.0, jammed: false, open: false }
-    }
-
-    fn out_of_skin(&self, query: &ContactQuery<'_>, overlap: &Overlap, other: &BodySkin, out: &mut Vec<Contact>) {
-        let Some(params) = self.body_contact else { return };
-        let direction = DVec3::from(overlap.direction);
-        let [first, other] = [&self.skins[overlap.skin], other]
-            .map(|skin| Side::new(query.from, &skin.touching, &skin.surface, [params.thickness, 0.0]));
-        for ([inner, outer], normal) in [([&first, &other], direction), ([&other, &first], -direction)] {
-            for exit in inner.exits(outer, inner.candidates, normal) {
-                let ([a, b, c], [u, v, w]) = outer.place(inner, &exit, normal);
-                let sides = ([exit.point, a, b, c], [1.0, -u, -v, -w]);
-                out.push(self.pushing((query, overlap, params.thickness), &exit, sides, normal));
-            }
-        }
-    }
-
-    /// Returns which particles are pushed.
-    fn out_of_obstacle(
+    /// Contacts without friction of a skin with another, or with an obstacle, which is given with its points at the end. Returns
+    /// which points of the first are pushed.
+    fn push_out(
         &self,
         query: &ContactQuery<'_>,
         overlap: &Overlap,
-        other: &Obstacle,
+        [first, other]: [&Side<'_>; 2],
+        gap: f64,
+        obstacle: Option<(&Obstacle, &[[f64; 3]])>,
         out: &mut Vec<Contact>,
     ) -> Vec<bool> {
-        let first = &self.skins[overlap.skin];
-        let normal = DVec3::from(overlap.direction);
-        let [start, end] = query.times.map(|time| other.at(time));
-        let mut push = |exit: &Exit, own: ([u32; 4], [f64; 4]), points: &[u32], shares: &[f64]| {
-            let contact = self.pushing((query, overlap, other.thickness), exit, own, normal);
-            let reached = Moment::of(&end).weighted(points, shares);
-            let velocity = other.velocity_of(query.times[1], points, shares) + DVec3::from(contact.velocity);
-            out.push(Contact { offset: normal.dot(&reached) + contact.offset, velocity: velocity.into(), ..contact });
-        };
-        let gaps = [other.thickness, 0.0];
-        let body = Side::new(query.from, &first.touching, &first.surface, gaps);
-        let solid = Side::new(&start, &other.surface.vertices, &other.surface, gaps);
-        let exits = body.exits(&solid, body.candidates, normal);
-        for exit in &exits {
-            let (corners, shares) = solid.place(&body, exit, normal);
-            push(exit, ([exit.point, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]), &corners, &shares);
-        }
-        for exit in solid.exits(&body, solid.candidates, -normal) {
-            let ([a, b, c], [u, v, w]) = body.place(&solid, &exit, -normal);
-            push(&exit, ([a, b, c, 0], [u, v, w, 0.0]), &[exit.point], &[1.0]);
-        }
+        let direction = DVec3::from(overlap.direction);
         let mut pushed = vec![false; query.from.len()];
-        exits.iter().for_each(|exit| pushed[exit.point as usize] = true);
+        for (own, [inner, outer], normal) in [(true, [first, other], direction), (false, [other, first], -direction)] {
+            for exit in inner.exits(outer, inner.candidates, normal) {
+                let (corners, shares) = outer.place(inner, &exit, normal);
+                let sides: [Weighted<'_>; 2] = [(&[exit.point], &[1.0]), (&corners, &shares)];
+                let contact = match obstacle {
+                    None => Contact::between(sides, normal, gap),
+                    Some((obstacle, end)) => {
+                        let [body, (points, shares)] = if own { sides } else { [sides[1], sides[0]] };
+                        Contact {
+                            offset: direction.dot(&Moment::of(end).weighted(points, shares)),
+                            velocity: obstacle.velocity_of(query.times[1], points, shares).into(),
+                            ..Contact::between([body, (&[], &[])], direction, gap)
+                        }
+                    }
+                };
+                out.push(self.allowed(overlap, exit.distance + gap, query.times).of(contact));
+                if own {
+                    pushed[exit.point as usize] = true;
+                }
+            }
+        }
         pushed
     }
 
@@ -351,16 +335,10 @@ impl CollisionScene<'_> {
                 continue;
             }
             // Points outside are left to contacts, which know how near they are.
-            let mut within = vec![false; x.len()];
-            Enclosure::new(&solid.points, &solid.surface.triangles, 0.0).mark(x, &near, &mut within);
-            let within: Vec<u32> = near.into_iter().filter(|point| within[*point as usize]).collect();
-            if within.is_empty() {
-                continue;
-            }
-            let tree = TriangleTree::build(&narrow(&solid.points), &solid.surface.triangles);
+            let within = Enclosure::new(&solid.points, &solid.surface.triangles, 0.0).within(x, near);
             let from: Vec<_> = within.iter().map(|point| x[*point as usize]).collect();
-            for (point, closest) in within.iter().zip(tree.closest_each(&narrow(&from), f32::INFINITY)) {
-                let Some(distance) = closest.map(|closest| f64::from(closest.distance)) else { continue };
+            for (point, distance) in within.iter().zip(solid.distances(&from)) {
+                let Some(distance) = distance else { continue };
                 inside[*point as usize] |= distance > TOUCHING * solid.gap;
                 found.deepest = found.deepest.max(solid.gap + distance);
             }

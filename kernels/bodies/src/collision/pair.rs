@@ -3,8 +3,8 @@
 use super::body_skin::BodySkin;
 use super::edge;
 use super::vertex::{self, ContactRules, MovingSurface};
-use super::{CollisionScene, OverlapPartner, REACH, Yielding, collect_in_order};
-use crate::mass_spring::{Contact, ContactQuery};
+use super::{CollisionScene, OverlapPartner, REACH, Scratch, Yielding, collect_in_order};
+use crate::mass_spring::{Contact, ContactQuery, Weighted};
 use numerics::swept::{self, SweptBoxTree};
 use numerics::tree::Cuboid;
 use numerics::vector::DVec3;
@@ -37,7 +37,7 @@ struct Pair<'a> {
 
 /// Marks the neighbourhood of some points, by the number of the query that marked them last.
 #[derive(Default)]
-struct Marks {
+pub(super) struct Marks {
     of: Vec<u32>,
     last: u32,
 }
@@ -124,28 +124,23 @@ impl Pair<'_> {
         let poses = [self.query.from, self.query.to];
         let [first, second] = self.skins;
         let on = MovingSurface { surface: &second.surface, poses: &poses };
-        let find_in = |marks: &mut Marks, particles: &[u32], out: &mut Vec<Contact>| {
-            let mut faces = Vec::new();
-            for particle in particles {
-                boxes.faces.overlapping(&self.points[*particle as usize], &mut faces);
-                if self.self_contact {
-                    marks.put(first, &[*particle]);
-                    faces.retain(|face| !marks.have(first, &first.surface.triangles[*face as usize]));
-                }
-                if faces.is_empty() {
-                    continue;
-                }
-                let path = poses.map(|pose| DVec3::from(pose[*particle as usize]));
-                for hit in vertex::hits(&path, &on, (&faces, None), &|| None, &self.rules) {
-                    let [a, b, c] = second.surface.triangles[hit.face as usize];
-                    let [u, v, w] = hit.weights;
-                    let gap = self.gap(|| first.rest_to_face(*particle, hit.face));
-                    out.extend(self.contact([*particle, a, b, c], [1.0, -u, -v, -w], hit.normal, hit.shift, gap));
-                }
-            }
-        };
         let particles = if self.self_contact { &first.surface.vertices } else { &first.touching };
-        collect_in_order(particles, &find_in, out);
+        collect_in_order(particles, out, |particle, Scratch { others: faces, marks, .. }, out| {
+            boxes.faces.overlapping(&self.points[particle as usize], faces);
+            if self.self_contact {
+                marks.put(first, &[particle]);
+                faces.retain(|face| !marks.have(first, &first.surface.triangles[*face as usize]));
+            }
+            if faces.is_empty() {
+                return;
+            }
+            let path = poses.map(|pose| DVec3::from(pose[particle as usize]));
+            for hit in vertex::hits(&path, &on, (faces, None), &|| None, &self.rules) {
+                let corners = &second.surface.triangles[hit.face as usize];
+                let sides = [(&[particle][..], &[1.0][..]), (corners, &hit.weights)];
+                out.extend(self.contact(sides, hit.normal, hit.shift, || first.rest_to_face(particle, hit.face)));
+            }
+        });
     }
 
     /// Edges of the first skin against those of the second.
@@ -154,50 +149,39 @@ impl Pair<'_> {
         let [first, second] = self.skins;
         let [one, two] = [first, second].map(|skin| MovingSurface { surface: &skin.surface, poses: &poses });
         let indices: Vec<u32> = (0..first.surface.edges.len() as u32).collect();
-        let find_in = |marks: &mut Marks, edges: &[u32], out: &mut Vec<Contact>| {
-            let mut others = Vec::new();
-            for index in edges {
-                let edge = &first.surface.edges[*index as usize];
-                boxes.edges.overlapping(&swept::bounds_of(&edge.ends, self.points), &mut others);
-                if self.self_contact {
-                    marks.put(first, &edge.ends);
-                    others.retain(|other| {
-                        *other > *index && !marks.have(first, &first.surface.edges[*other as usize].ends)
-                    });
-                }
-                for other_index in &others {
-                    let other = &second.surface.edges[*other_index as usize];
-                    if let Some(hit) = edge::hit([&one, &two], [edge, other], &self.rules) {
-                        let [s, t] = hit.shares;
-                        let ([a, b], [c, d]) = (edge.ends, other.ends);
-                        let gap = self.gap(|| first.rest_between(*index, *other_index));
-                        out.extend(self.contact([a, b, c, d], [1.0 - s, s, t - 1.0, -t], hit.normal, 0.0, gap));
-                    }
+        collect_in_order(&indices, out, |index, Scratch { others, marks, .. }, out| {
+            let edge = &first.surface.edges[index as usize];
+            boxes.edges.overlapping(&swept::bounds_of(&edge.ends, self.points), others);
+            if self.self_contact {
+                marks.put(first, &edge.ends);
+                let ends = |other: &u32| &first.surface.edges[*other as usize].ends;
+                others.retain(|other| *other > index && !marks.have(first, ends(other)));
+            }
+            for at in others {
+                let other = &second.surface.edges[*at as usize];
+                if let Some(hit) = edge::hit([&one, &two], [edge, other], &self.rules) {
+                    let sides = [(&edge.ends[..], &hit.weights[0][..]), (&other.ends, &hit.weights[1])];
+                    out.extend(self.contact(sides, hit.normal, 0.0, || first.rest_between(index, *at)));
                 }
             }
-        };
-        collect_in_order(&indices, &find_in, out);
+        });
     }
 
-    /// The gap of a pair; for elements of the same skin at most their distance at rest.
-    fn gap(&self, at_rest: impl FnOnce() -> f64) -> f64 {
-        if self.self_contact { self.params.thickness.min(at_rest()) } else { self.params.thickness }
-    }
-
-    fn contact(&self, points: [u32; 4], weights: [f64; 4], normal: DVec3, shift: f64, gap: f64) -> Option<Contact> {
-        if gap < JOINED * self.params.thickness {
+    /// The contact of two elements, if they are of the same skin with a gap that is at most their distance `at_rest`.
+    fn contact(
+        &self,
+        sides: [Weighted<'_>; 2],
+        normal: DVec3,
+        shift: f64,
+        at_rest: impl FnOnce() -> f64,
+    ) -> Option<Contact> {
+        let ContactParams { thickness, friction } = self.params;
+        let gap = if self.self_contact { thickness.min(at_rest()) } else { thickness };
+        if gap < JOINED * thickness {
             return None;
         }
-        Some(self.yielding.of(Contact {
-            points,
-            weights,
-            normal: normal.into(),
-            offset: -shift,
-            gap,
-            velocity: [0.0; 3],
-            friction: self.params.friction * self.scene.friction_scale(&points, &weights),
-            jammed: false,
-            open: false,
-        }))
+        let contact = Contact::between(sides, normal, gap);
+        let friction = friction * self.scene.friction_scale(&contact);
+        Some(self.yielding.of(Contact { offset: -shift, friction, ..contact }))
     }
 }

@@ -36,8 +36,11 @@ const SAME_DIRECTION: f64 = 0.7;
 /// Slip, in body lengths a second, above which friction is μN; proportional below.
 const CREEP: f64 = 2e-5;
 
+/// Some points, and their weights.
+pub(crate) type Weighted<'a> = (&'a [u32], &'a [f64]);
+
 /// Two surfaces that may touch. With u = Σ wᵢxᵢ, n·u − offset is the distance of the first from the second.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Contact {
     /// The contact points involved, those of the first surface first; entries of weight 0 are unused.
     pub points: [u32; 4],
@@ -62,6 +65,17 @@ pub struct Contact {
 }
 
 impl Contact {
+    /// A contact at rest and without friction of points of one surface with points of another, none of an obstacle.
+    pub(crate) fn between([first, second]: [Weighted<'_>; 2], normal: DVec3, gap: f64) -> Self {
+        let mut contact = Self { normal: normal.into(), gap, ..Self::default() };
+        let all = [(first, 1.0), (second, -1.0)].into_iter();
+        let all = all.flat_map(|((points, weights), sign)| points.iter().zip(weights.iter().map(move |w| w * sign)));
+        for (slot, (point, weight)) in all.enumerate() {
+            (contact.points[slot], contact.weights[slot]) = (*point, weight);
+        }
+        contact
+    }
+
     /// Depth below its gap with contact points at `x`, metres; negative above it.
     pub(crate) fn depth(&self, x: &[[f64; 3]]) -> f64 {
         let sides = self.points.iter().zip(self.weights).filter(|side| side.1 != 0.0);
