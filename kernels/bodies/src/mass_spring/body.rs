@@ -14,6 +14,7 @@ use super::regions::Regions;
 use super::spacing::spacings;
 use super::tet_springs::{EDGES, edges, neighbours_of_missing};
 use crate::embedding::{EmbeddedPoint, with_riding};
+use crate::tets::bounds;
 use numerics::adjacency::Adjacency;
 use numerics::cluster_order::ClusterOrder;
 use numerics::masked::Masked;
@@ -365,7 +366,7 @@ impl SoftBody {
         }
 
         let (mut ends, tet_springs) = edges(mesh.tets);
-        let means = neighbours_of_missing(mesh, &ends, &tet_springs);
+        let means = neighbours_of_missing(mesh, &ends);
         ends.extend(mesh.missing);
         let mesh_spring_count = ends.len();
         ends.extend(joints.iter().map(|spring| spring.ends));
@@ -390,8 +391,7 @@ impl SoftBody {
         let rest: Vec<DVec3> = order.caller_of.iter().map(|caller| points[*caller as usize]).collect();
         let (kept, tets) = with_volume(mesh, &points, &order);
         let volumes: Vec<f64> = kept.iter().map(|tet| given[*tet as usize].volume).collect();
-        let low = rest.iter().fold(DVec3::repeat(f64::INFINITY), |low, p| low.inf(p));
-        let high = rest.iter().fold(DVec3::repeat(f64::NEG_INFINITY), |high, p| high.sup(p));
+        let [low, high] = bounds(mesh.points.iter().copied()).map(DVec3::from);
         let regions = Regions::new(&rest, &tets);
         let adjacency = Adjacency::new(&order.clusters, &ends);
         let layout = Layout::new(&order, &adjacency, &regions);
