@@ -89,7 +89,7 @@ impl Stepper<'_> {
     pub(super) fn euler(&mut self, step: Interval<'_>, contacts: &mut Vec<ContactConstraint>, guess: Guess) -> StepEnd {
         let Interval { start, times, h } = step;
         let mut z = start.x.clone();
-        let y: Vec<DVec3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
+        let y = step.ahead();
         let mut x = match guess {
             Guess::Predicted => self.slid(&start.x, &y, contacts, h),
             Guess::Start => start.x.clone(),
@@ -208,10 +208,10 @@ impl Stepper<'_> {
     /// Sets pieces that fell more than `FAR` into an obstacle, which was not known yet, to where they `were`; returns whether
     /// there are any.
     fn set_back(&self, were: &[DVec3], contacts: &[ContactConstraint], x: &mut [DVec3]) -> bool {
-        let mut any = false;
-        let far = self.far_below(contacts, x, DVec3::zeros());
-        for (piece, _) in far.into_iter().filter(|piece| piece.1.is_some()) {
-            any = true;
+        let mut far = self.far_below(contacts, x, DVec3::zeros());
+        far.retain(|piece| piece.1.is_some());
+        let any = !far.is_empty();
+        for (piece, _) in far {
             for particle in piece.filter(|particle| !self.context.external.held[*particle]) {
                 x[particle] = were[particle];
             }

@@ -16,17 +16,10 @@ const ROUNDS: u32 = 4;
 const TURNS: u32 = 8;
 
 impl Stepper<'_> {
-    /// Changes the `end` of a step from `start` so that contacts with open obstacles and the ground that were not too deep at its start
-    /// are not at its end.
-    pub(super) fn keep_sides(
-        &mut self,
-        start: &Kinematics,
-        times: [f64; 2],
-        end: &mut Kinematics,
-        stepped: &mut Stepped,
-    ) {
-        let h = (times[1] - times[0]) * self.seconds;
-        let step = Interval { start, times, h };
+    /// Changes the `end` of a step so that contacts with open obstacles and the ground that were not too deep at its start are
+    /// not at its end.
+    pub(super) fn keep_sides(&mut self, step: Interval<'_>, end: &mut Kinematics, stepped: &mut Stepped) {
+        let Interval { start, times, h } = step;
         let (mass, held) = (&self.context.body.mass, self.context.external.held.clone());
         let mut met: Vec<ContactConstraint> = Vec::new();
         for _ in 0..ROUNDS {
@@ -69,7 +62,7 @@ impl Stepper<'_> {
         self.refresh_inventory(&end.x);
         stepped.after = measure(self.solver, &self.context, times[1], [&end.x, &end.v], false);
         self.take_energy(stepped.after.sum() - before, &held, end, stepped);
-        stepped.energy_lost += before - stepped.after.sum();
+        stepped.report.energy_lost += before - stepped.after.sum();
     }
 
     /// Slows what is not held by the energy `gained` when particles were moved back, joules.
