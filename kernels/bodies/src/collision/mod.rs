@@ -86,6 +86,9 @@ pub enum CollisionError {
     Number(&'static str, f64),
 }
 
+/// What is done with the contacts of a skin and a partner.
+type ActOnPair<'a> = dyn FnMut(usize, Option<OverlapPartner>, Vec<Contact>) + 'a;
+
 /// Everything that may be in contact.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CollisionScene<'a> {
@@ -108,34 +111,8 @@ pub struct CollisionScene<'a> {
 }
 
 impl ContactFinder for CollisionScene<'_> {
-    /// The order is: ground contacts by particle; those of what is being pushed apart; those of each obstacle by
-    /// particle, then by its own points, then by edges; then pairs of bodies; then self-contacts. An obstacle that a body is
-    /// pushed out of keeps out the particles that are not in it, so that it can go on pressing.
     fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
-        self.on_ground(query, out);
-        let pushed = self.separate(query, out);
-        let boxes = swept::swept_boxes(&[query.from, query.to]);
-        if !self.obstacles.is_empty() {
-            for (index, skin) in self.skins.iter().enumerate() {
-                let faces = skin.faces.sweep(&boxes, 0.0);
-                let released = skin.released(query.from);
-                for obstacle in 0..self.obstacles.len() {
-                    let pushed = pushed.get(&(index, obstacle));
-                    let released = match pushed {
-                        Some(particles) => ReleasedElements { particles: particles.clone(), ..Default::default() },
-                        None => skin.releasing(&released, self.caught_by(obstacle)),
-                    };
-                    self.against_obstacle(query, (index, &released), &boxes, obstacle, &mut |meeting, tree| {
-                        meeting.particles(tree, out);
-                        if pushed.is_none() {
-                            meeting.points(&faces, out);
-                            meeting.edges(out);
-                        }
-                    });
-                }
-            }
-        }
-        self.pairs(query, &boxes, out);
+        self.each_pair(query, &mut |_, _, contacts| out.extend(contacts));
     }
 
     fn least_steps(&self, query: &ContactQuery<'_>) -> u32 {
@@ -160,17 +137,51 @@ impl ContactFinder for CollisionScene<'_> {
 }
 
 impl CollisionScene<'_> {
-    fn on_ground(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
+    /// Calls `act` with the contacts of each skin, by index, with each partner; `None`: with itself.
+    ///
+    /// The order is: ground contacts by particle; those of what is being pushed apart; those of each obstacle by
+    /// particle, then by its own points, then by edges; then pairs of bodies; then self-contacts. An obstacle that a body is
+    /// pushed out of keeps out the particles that are not in it, so that it can go on pressing.
+    fn each_pair(&self, query: &ContactQuery<'_>, act: &mut ActOnPair<'_>) {
+        self.on_ground(query, act);
+        let pushed = self.separate(query, act);
+        let boxes = swept::swept_boxes(&[query.from, query.to]);
+        if !self.obstacles.is_empty() {
+            for (index, skin) in self.skins.iter().enumerate() {
+                let faces = skin.faces.sweep(&boxes, 0.0);
+                let released = skin.released(query.from);
+                for obstacle in 0..self.obstacles.len() {
+                    let pushed = pushed.get(&(index, obstacle));
+                    let released = match pushed {
+                        Some(particles) => ReleasedElements { particles: particles.clone(), ..Default::default() },
+                        None => skin.releasing(&released, self.caught_by(obstacle)),
+                    };
+                    self.against_obstacle(query, (index, &released), &boxes, obstacle, &mut |meeting, tree| {
+                        let mut contacts = Vec::new();
+                        meeting.particles(tree, &mut contacts);
+                        if pushed.is_none() {
+                            meeting.points(&faces, &mut contacts);
+                            meeting.edges(&mut contacts);
+                        }
+                        act(index, Some(OverlapPartner::Obstacle(obstacle)), contacts);
+                    });
+                }
+            }
+        }
+        self.pairs(query, &boxes, act);
+    }
+
+    fn on_ground(&self, query: &ContactQuery<'_>, act: &mut ActOnPair<'_>) {
         let Some(ground) = self.ground else { return };
         let up = DVec3::from(ground.up);
         for (index, skin) in self.skins.iter().enumerate() {
             let rising = self.separating(index, OverlapPartner::Ground);
             let yielding = self.yielding(index, Some(OverlapPartner::Ground), query.times);
-            for particle in &skin.touching {
+            let contact = |particle: &u32| {
                 let height = |x: &[[f64; 3]]| up.dot(&DVec3::from(x[*particle as usize])) - ground.height;
                 let before = height(query.from);
                 if before.min(height(query.to)) > REACH * ground.thickness {
-                    continue;
+                    return None;
                 }
                 let depth = (ground.thickness - before).max(0.0);
                 let rising = rising.map_or(Yielding::default(), |overlap| self.allowed(overlap, depth, query.times));
@@ -178,8 +189,9 @@ impl CollisionScene<'_> {
                 let friction = ground.friction * self.friction_scale(&contact);
                 let contact = yielding.of(rising.of(Contact { offset: ground.height, friction, ..contact }));
                 // Contacts yield as they do with what has an inside.
-                out.push(Contact { open: true, ..contact });
-            }
+                Some(Contact { open: true, ..contact })
+            };
+            act(index, Some(OverlapPartner::Ground), skin.touching.iter().filter_map(contact).collect());
         }
     }
 

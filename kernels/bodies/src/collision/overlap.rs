@@ -14,7 +14,7 @@
 
 use super::solid::Solid;
 use super::surface::{Moment, TriangleSurface};
-use super::{Closeness, CollisionScene, ContactParams, Obstacle, Yielding};
+use super::{ActOnPair, Closeness, CollisionScene, Yielding};
 use crate::mass_spring::{Contact, ContactFinder, ContactQuery, Weighted};
 use crate::tets::{Enclosure, Exit};
 use numerics::closest_point::ClosestPoint;
@@ -84,49 +84,42 @@ pub struct Penetration {
     pub deepest: f64,
 }
 
-/// One side of an overlap: the points that may be inside the other, and its surface.
+/// One side of an overlap.
 struct Side<'a> {
-    points: &'a [[f64; 3]],
-    candidates: &'a [u32],
-    surface: &'a TriangleSurface,
-    /// The points, with those of the surface moved below it.
+    of: &'a Solid<'a>,
+    /// Its points, with those of the surface moved below it.
     below: Vec<[f64; 3]>,
-    solid: Enclosure,
+    enclosure: Enclosure,
 }
 
 impl<'a> Side<'a> {
     /// `touching` is the depth from which points count as inside.
-    fn new(
-        points: &'a [[f64; 3]],
-        candidates: &'a [u32],
-        surface: &'a TriangleSurface,
-        [gap, touching]: [f64; 2],
-    ) -> Self {
-        let below = below(points, surface, BELOW * gap);
-        Self { points, candidates, surface, below, solid: Enclosure::new(points, &surface.triangles, touching) }
+    fn new(of: &'a Solid<'a>, [gap, touching]: [f64; 2]) -> Self {
+        let below = below(&of.points, of.surface, BELOW * gap);
+        Self { of, below, enclosure: Enclosure::new(&of.points, &of.surface.triangles, touching) }
     }
 
     /// Which of its points are inside the other.
     fn within(&self, other: &Self) -> Vec<bool> {
-        let mut inside = vec![false; self.points.len()];
-        if other.surface.closed {
-            other.solid.mark(self.points, self.candidates, &mut inside);
-            other.solid.mark(&self.below, self.candidates, &mut inside);
+        let mut inside = vec![false; self.of.points.len()];
+        if other.of.surface.closed {
+            other.enclosure.mark(&self.of.points, self.of.candidates, &mut inside);
+            other.enclosure.mark(&self.below, self.of.candidates, &mut inside);
         }
         inside
     }
 
     /// Where those of its points that are inside the other, or a little below the surface are, leave it in a direction.
     fn exits(&self, other: &Self, candidates: &[u32], direction: DVec3) -> Vec<Exit> {
-        let mut exits = other.solid.exits(&self.below, candidates, direction);
+        let mut exits = other.enclosure.exits(&self.below, candidates, direction);
         for exit in &mut exits {
-            let [below, point] = [&self.below, self.points].map(|all| DVec3::from(all[exit.point as usize]));
+            let [below, point] = [&self.below[..], &self.of.points].map(|all| DVec3::from(all[exit.point as usize]));
             exit.distance = (exit.distance + direction.dot(&(below - point))).max(0.0);
         }
         // Those that are inside by less than that.
         let is_known = |point: &u32| exits.binary_search_by_key(point, |exit| exit.point).is_ok();
         let others: Vec<u32> = candidates.iter().copied().filter(|point| !is_known(point)).collect();
-        exits.extend(other.solid.exits(self.points, &others, direction));
+        exits.extend(other.enclosure.exits(&self.of.points, &others, direction));
         exits.sort_by_key(|exit| exit.point);
         exits
     }
@@ -134,16 +127,16 @@ impl<'a> Side<'a> {
     /// How far it has to go in a direction until no line through a point of its surface, as far as it is inside, is in
     /// the other: what is beyond a thin part of the other has to pass it, too.
     fn way_out(&self, other: &Self, direction: DVec3, gap: f64) -> f64 {
-        if !(self.surface.closed && other.surface.closed) {
+        if !(self.of.surface.closed && other.of.surface.closed) {
             return 0.0;
         }
-        let vertices = &self.surface.vertices;
-        let mut own = vec![0.0; self.points.len()];
-        for exit in self.solid.exits(&self.below, vertices, direction) {
+        let vertices = &self.of.surface.vertices;
+        let mut own = vec![0.0; self.of.points.len()];
+        for exit in self.enclosure.exits(&self.below, vertices, direction) {
             own[exit.point as usize] = exit.distance;
         }
         let mut way = 0.0_f64;
-        other.solid.stretches(&self.below, vertices, direction, |point, stretches| {
+        other.enclosure.stretches(&self.below, vertices, direction, |point, stretches| {
             let point = point as usize;
             let (mut left, own) = (0.0_f64, own[point] - BELOW * gap);
             for [enters, leaves] in stretches {
@@ -152,7 +145,7 @@ impl<'a> Side<'a> {
                 }
             }
             if left > 0.0 {
-                let [below, point] = [&self.below, self.points].map(|all| DVec3::from(all[point]));
+                let [below, point] = [&self.below[..], &self.of.points].map(|all| DVec3::from(all[point]));
                 way = way.max(left + direction.dot(&(below - point)));
             }
         });
@@ -161,17 +154,17 @@ impl<'a> Side<'a> {
 
     /// The triangle by which a point of another side leaves it, and the barycentric weights of where.
     fn place(&self, other: &Self, exit: &Exit, direction: DVec3) -> ([u32; 3], [f64; 3]) {
-        let passed = DVec3::from(other.points[exit.point as usize]) + direction * exit.distance;
-        let corners = self.surface.corners(&Moment::of(self.points), exit.face);
-        (self.surface.triangles[exit.face as usize], ClosestPoint::on(exit.face, passed, corners).weights)
+        let passed = DVec3::from(other.of.points[exit.point as usize]) + direction * exit.distance;
+        let corners = self.of.surface.corners(&Moment::of(&self.of.points), exit.face);
+        (self.of.surface.triangles[exit.face as usize], ClosestPoint::on(exit.face, passed, corners).weights)
     }
 
     /// Sum of the area vectors of its triangles that are inside, given which of its points are.
     fn area_within(&self, inside: &[bool]) -> DVec3 {
-        let at = Moment::of(self.points);
-        let faces = self.surface.triangles.iter().zip(0..);
+        let at = Moment::of(&self.of.points);
+        let faces = self.of.surface.triangles.iter().zip(0..);
         let faces = faces.filter(|(corners, _)| corners.iter().all(|corner| inside[*corner as usize]));
-        faces.map(|(_, face)| self.surface.corners(&at, face)).map(|[a, b, c]| (b - a).cross(&(c - a))).sum()
+        faces.map(|(_, face)| self.of.surface.corners(&at, face)).map(|[a, b, c]| (b - a).cross(&(c - a))).sum()
     }
 }
 
@@ -190,7 +183,7 @@ impl CollisionScene<'_> {
                 if !(is_skin || other.surface.closed) {
                     continue;
                 }
-                let sides = [own, other].map(|of| Side::new(&of.points, of.candidates, of.surface, [other.gap; 2]));
+                let sides = [own, other].map(|of| Side::new(of, [other.gap; 2]));
                 let room = if is_skin { None } else { self.room(own, x) };
                 let marked = add_overlap((skin, other), [&sides[0], &sides[1]], room, &mut found);
                 for marked in &marked[..1 + usize::from(is_skin)] {
@@ -244,70 +237,53 @@ impl CollisionScene<'_> {
         Yielding::falling([depth, allowed], separation.seconds * passed)
     }
 
-    /// Contacts of the pairs that are being pushed apart; returns what is pushed out of obstacles.
-    pub(super) fn separate(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) -> Pushed {
-        let mut pushed = Pushed::new();
+    /// Contacts without friction of the pairs that are being pushed apart; returns what is pushed out of obstacles.
+    pub(super) fn separate(&self, query: &ContactQuery<'_>, act: &mut ActOnPair<'_>) -> Pushed {
+        let mut all_pushed = Pushed::new();
+        if self.separated().is_empty() {
+            return all_pushed;
+        }
+        let boxes = swept::swept_boxes(&[query.from]);
+        let [skins, obstacles] = self.solids(query.from, &boxes, query.times[0]);
         for overlap in self.separated() {
-            let of_skin = |skin: usize, gap: f64| {
-                let skin = &self.skins[skin];
-                Side::new(query.from, &skin.touching, &skin.surface, [gap, 0.0])
+            let (other, obstacle) = match overlap.partner {
+                OverlapPartner::Obstacle(index) => (&obstacles[index], Some(&self.obstacles[index])),
+                OverlapPartner::Skin(index) if self.body_contact.is_some() => (&skins[index], None),
+                OverlapPartner::Ground | OverlapPartner::Skin(_) => continue,
             };
-            match overlap.partner {
-                OverlapPartner::Ground => {}
-                OverlapPartner::Obstacle(index) => {
-                    let obstacle = &self.obstacles[index];
-                    let gap = obstacle.thickness;
-                    let [start, end] = query.times.map(|time| obstacle.at(time));
-                    let solid = Side::new(&start, &obstacle.surface.vertices, &obstacle.surface, [gap, 0.0]);
-                    let sides = [&of_skin(overlap.skin, gap), &solid];
-                    let particles = self.push_out(query, overlap, sides, gap, Some((obstacle, &end)), out);
-                    pushed.insert((overlap.skin, index), particles);
-                }
-                OverlapPartner::Skin(index) => {
-                    let Some(ContactParams { thickness: gap, .. }) = self.body_contact else { continue };
-                    let sides = [&of_skin(overlap.skin, gap), &of_skin(index, gap)];
-                    self.push_out(query, overlap, sides, gap, None, out);
-                }
-            }
-        }
-        pushed
-    }
-
-    /// Contacts without friction of a skin with another, or with an obstacle, which is given with its points at the end. Returns
-    /// which points of the first are pushed.
-    fn push_out(
-        &self,
-        query: &ContactQuery<'_>,
-        overlap: &Overlap,
-        [first, other]: [&Side<'_>; 2],
-        gap: f64,
-        obstacle: Option<(&Obstacle, &[[f64; 3]])>,
-        out: &mut Vec<Contact>,
-    ) -> Vec<bool> {
-        let direction = DVec3::from(overlap.direction);
-        let mut pushed = vec![false; query.from.len()];
-        for (own, [inner, outer], normal) in [(true, [first, other], direction), (false, [other, first], -direction)] {
-            for exit in inner.exits(outer, inner.candidates, normal) {
-                let (corners, shares) = outer.place(inner, &exit, normal);
-                let sides: [Weighted<'_>; 2] = [(&[exit.point], &[1.0]), (&corners, &shares)];
-                let contact = match obstacle {
-                    None => Contact::between(sides, normal, gap),
-                    Some((obstacle, end)) => {
-                        let [body, (points, shares)] = if own { sides } else { [sides[1], sides[0]] };
-                        Contact {
-                            offset: direction.dot(&Moment::of(end).weighted(points, shares)),
-                            velocity: obstacle.velocity_of(query.times[1], points, shares).into(),
-                            ..Contact::between([body, (&[], &[])], direction, gap)
+            let (gap, direction) = (other.gap, DVec3::from(overlap.direction));
+            let end = obstacle.map(|obstacle| obstacle.at(query.times[1]));
+            let [first, other] = [&skins[overlap.skin], other].map(|of| Side::new(of, [gap, 0.0]));
+            let (mut contacts, mut pushed) = (Vec::new(), vec![false; query.from.len()]);
+            for (own, [inner, outer], normal) in
+                [(true, [&first, &other], direction), (false, [&other, &first], -direction)]
+            {
+                for exit in inner.exits(outer, inner.of.candidates, normal) {
+                    let (corners, shares) = outer.place(inner, &exit, normal);
+                    let sides: [Weighted<'_>; 2] = [(&[exit.point], &[1.0]), (&corners, &shares)];
+                    let contact = match obstacle.zip(end.as_ref()) {
+                        None => Contact::between(sides, normal, gap),
+                        Some((obstacle, end)) => {
+                            let [body, (points, shares)] = if own { sides } else { [sides[1], sides[0]] };
+                            Contact {
+                                offset: direction.dot(&Moment::of(end).weighted(points, shares)),
+                                velocity: obstacle.velocity_of(query.times[1], points, shares).into(),
+                                ..Contact::between([body, (&[], &[])], direction, gap)
+                            }
                         }
+                    };
+                    contacts.push(self.allowed(overlap, exit.distance + gap, query.times).of(contact));
+                    if own {
+                        pushed[exit.point as usize] = true;
                     }
-                };
-                out.push(self.allowed(overlap, exit.distance + gap, query.times).of(contact));
-                if own {
-                    pushed[exit.point as usize] = true;
                 }
             }
+            act(overlap.skin, Some(overlap.partner), contacts);
+            if let OverlapPartner::Obstacle(index) = overlap.partner {
+                all_pushed.insert((overlap.skin, index), pushed);
+            }
         }
-        pushed
+        all_pushed
     }
 
     /// Where contact points at `x` are at the end of the frame.
@@ -363,7 +339,7 @@ fn add_overlap(
 ) -> [Vec<bool>; 2] {
     let (gap, inside) = (solid.gap, [side.within(other), other.within(side)]);
     let [own, others] = [(side, &inside[0]), (other, &inside[1])].map(|(side, inside)| {
-        let all = side.candidates.iter().copied().filter(|point| inside[*point as usize]);
+        let all = side.of.candidates.iter().copied().filter(|point| inside[*point as usize]);
         all.collect::<Vec<u32>>()
     });
     if own.is_empty() && others.is_empty() {

@@ -3,7 +3,7 @@
 use super::body_skin::BodySkin;
 use super::edge;
 use super::vertex::{self, ContactRules, MovingSurface};
-use super::{CollisionScene, OverlapPartner, REACH, Scratch, Yielding, collect_in_order};
+use super::{ActOnPair, CollisionScene, OverlapPartner, REACH, Scratch, Yielding, collect_in_order};
 use crate::mass_spring::{Contact, ContactQuery, Weighted};
 use numerics::swept::{self, SweptBoxTree};
 use numerics::tree::Cuboid;
@@ -72,7 +72,7 @@ struct Boxes<'a> {
 
 impl CollisionScene<'_> {
     /// All pairs of skins, then each skin with itself.
-    pub(super) fn pairs(&self, query: &ContactQuery<'_>, points: &[Cuboid], out: &mut Vec<Contact>) {
+    pub(super) fn pairs(&self, query: &ContactQuery<'_>, points: &[Cuboid], act: &mut ActOnPair<'_>) {
         let boxes = |reach: f64| -> Vec<Boxes<'_>> {
             let of = self.skins.iter().map(|skin| Boxes {
                 bounds: swept::inflated(&swept::bounds_of_finite(&skin.touching, points), reach),
@@ -100,19 +100,23 @@ impl CollisionScene<'_> {
             for second in 1..self.skins.len() {
                 for first in 0..second {
                     let meet = swept::overlap(&boxes[first].bounds, &boxes[second].bounds);
-                    if meet && self.separating(first, OverlapPartner::Skin(second)).is_none() {
-                        pair([first, second], false, params).particles(&boxes[second], out);
-                        pair([second, first], false, params).particles(&boxes[first], out);
-                        pair([first, second], false, params).edges(&boxes[second], out);
+                    let partner = OverlapPartner::Skin(second);
+                    if meet && self.separating(first, partner).is_none() {
+                        let mut contacts = Vec::new();
+                        pair([first, second], false, params).particles(&boxes[second], &mut contacts);
+                        pair([second, first], false, params).particles(&boxes[first], &mut contacts);
+                        pair([first, second], false, params).edges(&boxes[second], &mut contacts);
+                        act(first, Some(partner), contacts);
                     }
                 }
             }
         }
         if let Some(params) = self.self_contact {
             for (skin, boxes) in boxes(REACH * params.thickness).iter().enumerate() {
-                let pair = pair([skin, skin], true, params);
-                pair.particles(boxes, out);
-                pair.edges(boxes, out);
+                let (pair, mut contacts) = (pair([skin, skin], true, params), Vec::new());
+                pair.particles(boxes, &mut contacts);
+                pair.edges(boxes, &mut contacts);
+                act(skin, None, contacts);
             }
         }
     }
