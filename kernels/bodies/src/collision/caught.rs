@@ -37,7 +37,7 @@ impl CollisionScene<'_> {
         let query = ContactQuery { from, to, times: [0.0, 1.0] };
         let boxes = swept::swept_boxes(&[from, to]);
         let (mut caught, released) = (Vec::new(), ReleasedElements::default());
-        for obstacle in (0..self.obstacles.len()).filter(|index| self.obstacles[*index].is_closed()) {
+        for obstacle in (0..self.obstacles.len()).filter(|index| self.obstacles[*index].surface.closed) {
             for (index, skin) in self.skins.iter().enumerate() {
                 let mut own = Vec::new();
                 self.against_obstacle(&query, (index, &released), &boxes, obstacle, &mut |meeting, tree| {

@@ -80,11 +80,6 @@ impl Obstacle {
         })
     }
 
-    /// Whether it has an inside: every edge has two consistently oriented triangles.
-    pub fn is_closed(&self) -> bool {
-        self.surface.closed
-    }
-
     /// Positions of its points at a time in the frame, metres: exact at poses, between them by the best-fitting rigid
     /// motion and a linear remainder.
     pub fn at(&self, share: f64) -> Vec<[f64; 3]> {

@@ -109,12 +109,16 @@ impl<'a> Side<'a> {
         inside
     }
 
+    /// How far a point was moved along a direction to be below the surface.
+    fn lowered(&self, point: usize, direction: DVec3) -> f64 {
+        direction.dot(&(DVec3::from(self.below[point]) - DVec3::from(self.of.points[point])))
+    }
+
     /// Where those of its points that are inside the other, or a little below the surface are, leave it in a direction.
     fn exits(&self, other: &Self, candidates: &[u32], direction: DVec3) -> Vec<Exit> {
         let mut exits = other.enclosure.exits(&self.below, candidates, direction);
         for exit in &mut exits {
-            let [below, point] = [&self.below[..], &self.of.points].map(|all| DVec3::from(all[exit.point as usize]));
-            exit.distance = (exit.distance + direction.dot(&(below - point))).max(0.0);
+            exit.distance = (exit.distance + self.lowered(exit.point as usize, direction)).max(0.0);
         }
         // Those that are inside by less than that.
         let is_known = |point: &u32| exits.binary_search_by_key(point, |exit| exit.point).is_ok();
@@ -145,8 +149,7 @@ impl<'a> Side<'a> {
                 }
             }
             if left > 0.0 {
-                let [below, point] = [&self.below[..], &self.of.points].map(|all| DVec3::from(all[point]));
-                way = way.max(left + direction.dot(&(below - point)));
+                way = way.max(left + self.lowered(point, direction));
             }
         });
         way

@@ -20,6 +20,7 @@ use numerics::cluster_order::ClusterOrder;
 use numerics::masked::Masked;
 use numerics::partition::Partition;
 use numerics::vector::DVec3;
+use std::ops::Range;
 
 /// Shortest length used in k = E·ΣV/L², as a fraction of the mean length: bounds k at duplicate points to 1e6 times
 /// that of other springs.
@@ -239,29 +240,28 @@ impl SoftBody {
         for ((tet, volume), modulus) in self.tets.iter().zip(&self.volumes).zip(&self.moduli) {
             stiff[tet[0] as usize] += volume * modulus;
         }
-        let ratio = |piece: &std::ops::Range<usize>| {
-            let particles = self.particles(piece);
+        let ratio = |particles: Range<usize>| {
             let along = self.rest[particles.clone()].iter().map(|x| gravity.dot(x));
             let (low, high) =
                 along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
             stiff[particles.clone()].iter().sum::<f64>() / (self.mass_of(particles) * (high - low))
         };
-        self.order.pieces.iter().map(ratio).collect()
+        self.pieces().map(ratio).collect()
     }
 
-    /// The particles of a piece.
-    pub(super) fn particles(&self, piece: &std::ops::Range<usize>) -> std::ops::Range<usize> {
-        let clusters = &self.order.clusters;
-        clusters.range(piece.start).start..clusters.range(piece.end - 1).end
+    /// The particles of each piece.
+    pub(super) fn pieces(&self) -> impl Iterator<Item = Range<usize>> {
+        let clusters = |cluster: usize| self.order.clusters.range(cluster);
+        self.order.pieces.iter().map(move |piece| clusters(piece.start).start..clusters(piece.end - 1).end)
     }
 
     /// Mass of some particles, kilograms.
-    pub(super) fn mass_of(&self, particles: std::ops::Range<usize>) -> f64 {
+    pub(super) fn mass_of(&self, particles: Range<usize>) -> f64 {
         self.mass[particles].iter().sum()
     }
 
     /// The mean of `values` over some particles, weighted by mass.
-    pub(super) fn mean_by_mass(&self, particles: std::ops::Range<usize>, values: &[DVec3]) -> DVec3 {
+    pub(super) fn mean_by_mass(&self, particles: Range<usize>, values: &[DVec3]) -> DVec3 {
         let each = particles.clone().map(|particle| values[particle] * self.mass[particle]);
         each.sum::<DVec3>() / self.mass_of(particles)
     }

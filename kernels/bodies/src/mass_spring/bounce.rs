@@ -147,8 +147,7 @@ impl Stepper<'_> {
 
     fn rotating(&self, piece: usize, motion: &Kinematics) -> Option<RigidMotion> {
         let (body, held) = (self.context.body, &self.context.external.held);
-        let piece = body.order.pieces.get(piece)?;
-        Some(RigidMotion::new(body, held, piece, [&motion.x, &motion.v, &motion.v]))
+        Some(RigidMotion::new(body, held, body.pieces().nth(piece)?, [&motion.x, &motion.v, &motion.v]))
     }
 
     /// The speed at which pieces approach each other, as wholes or where they touch.

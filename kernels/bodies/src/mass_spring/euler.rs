@@ -159,8 +159,7 @@ impl Stepper<'_> {
             near[body.layout.piece_of(particle)] = true;
         }
         let mut x = start.x.clone();
-        for (piece, _) in body.order.pieces.iter().zip(near).filter(|(_, near)| !near) {
-            let particles = body.particles(piece);
+        for (particles, _) in body.pieces().zip(near).filter(|(_, near)| !near) {
             if !particles.clone().any(|particle| self.solver.system.is_loose(particle)) {
                 let by = body.mean_by_mass(particles.clone(), &start.v) * h;
                 x[particles].iter_mut().for_each(|x| *x += by);
@@ -194,7 +193,7 @@ impl Stepper<'_> {
     /// it is more than `FAR`.
     fn far_below(&self, contacts: &[ContactConstraint], x: &[DVec3], by: DVec3) -> Vec<(Range<usize>, Option<DVec3>)> {
         let body = self.context.body;
-        let mut pieces: Vec<_> = body.order.pieces.iter().map(|piece| (body.particles(piece), None)).collect();
+        let mut pieces: Vec<_> = body.pieces().map(|piece| (piece, None)).collect();
         for contact in contacts.iter().filter(|contact| !contact.is_two_sided()) {
             let depth = -contact.clearance(x, 0.0) - contact.normal.dot(&by);
             let (_, way) = &mut pieces[body.layout.piece_of(contact.particles[0] as usize)];

@@ -171,8 +171,7 @@ pub(super) fn envelope(layout: &Layout, system: &System) -> (usize, Vec<u32>) {
         let widths = first.iter().enumerate().map(|(cluster, first)| (cluster + 1 - *first as usize) as f64);
         (widths.map(|width| width * width).sum::<f64>(), (rows, first))
     };
-    let count = if system.transient.is_empty() { 0 } else { system.transient.len() };
-    let (anchors, all) = (joined(system.anchors.min(count)), joined(count));
+    let (anchors, all) = (joined(system.anchors), joined(system.transient.len()));
     if all.0 <= f64::max(DEARER * anchors.0, CHEAP) { all.1 } else { anchors.1 }
 }
 

@@ -44,8 +44,6 @@ pub(super) fn heaps(body: &SoftBody, gravity: DVec3) -> Vec<bool> {
         return Vec::new();
     }
     let mut heaps = vec![false; body.len()];
-    for (piece, ratio) in body.order.pieces.iter().zip(ratios) {
-        heaps[body.particles(piece)].fill(ratio < HEAP);
-    }
+    body.pieces().zip(ratios).for_each(|(piece, ratio)| heaps[piece].fill(ratio < HEAP));
     heaps
 }

@@ -10,6 +10,7 @@
 //! would rebound 1.4 times as fast, since a second-order method extrapolates forces. The same holds for a step in
 //! which contacts change or that failed; it is repeated from its start.
 
+use super::balance::TakenStep;
 use super::body::SoftBody;
 use super::contact::{ContactConstraint, ContactMode};
 use super::energy::{Energies, measure};
@@ -167,8 +168,9 @@ impl Stepper<'_> {
         } else {
             motion.carried.energy_budget = 0.0;
         }
-        stepped.impact_error = self.impact_error(step, &motion, &full, &errors);
-        let lost = self.energy_lost([before, &stepped.after], step, &motion, &full);
+        let taken = TakenStep { interval: step, end: &motion, contacts: &full };
+        stepped.impact_error = self.impact_error(taken, &errors);
+        let lost = self.energy_lost([before, &stepped.after], taken);
         stepped.report.energy_lost = lost + slowed.unwrap_or(0.0);
         (motion, stepped)
     }
@@ -257,7 +259,7 @@ impl Stepper<'_> {
         for turning in [true, false] {
             let gained = -*budget;
             let mut moved = motion.v.clone();
-            for piece in &body.order.pieces {
+            for piece in body.pieces() {
                 let rigid = RigidMotion::new(body, held, piece, [&motion.x, &motion.v, &motion.acceleration]);
                 let rigid = if turning { rigid } else { rigid.without_rotation() };
                 for particle in rigid.particles.clone() {
