@@ -41,7 +41,6 @@ use numerics::vector::{DVec3, to_f32};
 pub use obstacle::{Ground, Obstacle};
 pub use overlap::{Overlap, OverlapPartner, Penetration, Separation};
 pub use pair::ContactParams;
-use pair::Marks;
 use std::sync::Mutex;
 use surface::Positions;
 use vertex::{ContactRules, MovingSurface};
@@ -148,20 +147,18 @@ impl CollisionScene<'_> {
         let boxes = swept::swept_boxes(&[query.from, query.to]);
         if !self.obstacles.is_empty() {
             for (index, skin) in self.skins.iter().enumerate() {
-                let faces = skin.faces.sweep(&boxes, 0.0);
+                let faces = skin.surface.swept.sweep(&boxes, 0.0);
                 let released = skin.released(query.from);
                 for obstacle in 0..self.obstacles.len() {
                     let pushed = pushed.get(&(index, obstacle));
-                    let released = match pushed {
-                        Some(particles) => ReleasedElements { particles: particles.clone(), ..Default::default() },
-                        None => skin.releasing(&released, self.caught_by(obstacle)),
-                    };
-                    self.against_obstacle(query, (index, &released), &boxes, obstacle, &mut |meeting, tree| {
+                    let usual = || skin.releasing(&released, self.caught_by(obstacle));
+                    let released = pushed.cloned().unwrap_or_else(usual);
+                    self.against_obstacle(query, index, &boxes, obstacle, &mut |meeting, tree| {
                         let mut contacts = Vec::new();
-                        meeting.particles(tree, &mut contacts);
+                        meeting.particles(tree, &released, &mut contacts);
                         if pushed.is_none() {
-                            meeting.points(&faces, &mut contacts);
-                            meeting.edges(&mut contacts);
+                            meeting.points(&faces, &released, &mut contacts);
+                            meeting.edges(&released, &mut contacts);
                         }
                         act(index, Some(OverlapPartner::Obstacle(obstacle)), contacts);
                     });
@@ -207,12 +204,12 @@ impl CollisionScene<'_> {
         if whole > 0.0 { sum / whole } else { 1.0 }
     }
 
-    /// Calls `act` with a skin, by index, without its released elements, and an obstacle, unless they stay apart, and with the
-    /// swept boxes of the obstacle's triangles. `boxes` are those of the particles.
+    /// Calls `act` with a skin and an obstacle, by index, unless they stay apart, and with the swept boxes of the obstacle's
+    /// triangles. `boxes` are those of the particles.
     fn against_obstacle(
         &self,
         query: &ContactQuery<'_>,
-        (skin_index, released): (usize, &ReleasedElements),
+        skin_index: usize,
         boxes: &[Cuboid],
         index: usize,
         act: &mut dyn FnMut(&SkinObstaclePair<'_>, &SweptBoxTree<'_>),
@@ -223,7 +220,7 @@ impl CollisionScene<'_> {
         let obstacle_poses: Vec<Vec<[f64; 3]>> = times.iter().map(|time| obstacle.at(*time)).collect();
         let obstacle_poses: Vec<Positions<'_>> = obstacle_poses.iter().map(Vec::as_slice).collect();
         let still_boxes = swept::swept_boxes(&obstacle_poses);
-        let tree = obstacle.faces.sweep(&still_boxes, rules.reach);
+        let tree = obstacle.surface.swept.sweep(&still_boxes, rules.reach);
         let caught = self.caught_by(index);
         if caught.is_empty() && !swept::overlap(&swept::bounds_of_finite(&skin.touching, boxes), &tree.bounds) {
             return;
@@ -236,7 +233,6 @@ impl CollisionScene<'_> {
             scene: self,
             query,
             skin,
-            released,
             obstacle,
             caught,
             boxes: [boxes, &still_boxes],
@@ -254,9 +250,8 @@ fn poses_between(query: &ContactQuery<'_>, times: &[f64]) -> Vec<Vec<[f64; 3]>> 
     let whole = query.times[1] - query.times[0];
     let at = |time: &f64| {
         let share = if whole > 0.0 { (time - query.times[0]) / whole } else { 1.0 };
-        let mut pose = vec![[0.0; 3]; query.from.len()];
-        parallel::fill(&mut pose, POINTS, |n| DVec3::from(query.from[n]).lerp(&DVec3::from(query.to[n]), share).into());
-        pose
+        let point = |n: usize| DVec3::from(query.from[n]).lerp(&DVec3::from(query.to[n]), share).into();
+        parallel::tabulate(query.from.len(), POINTS, point)
     };
     times[1..times.len() - 1].iter().map(at).collect()
 }
@@ -266,7 +261,6 @@ struct SkinObstaclePair<'a> {
     scene: &'a CollisionScene<'a>,
     query: &'a ContactQuery<'a>,
     skin: &'a BodySkin,
-    released: &'a ReleasedElements,
     obstacle: &'a Obstacle,
     caught: &'a [CaughtParticle],
     /// Swept boxes of the particles and of the obstacle's points.
@@ -277,45 +271,34 @@ struct SkinObstaclePair<'a> {
     yielding: Yielding,
 }
 
-/// Buffers of a task, which another may have used before.
-#[derive(Default)]
-struct Scratch {
-    others: Vec<u32>,
-    path: Vec<DVec3>,
-    marks: Marks,
-}
+/// What an element may meet, and marks on points: buffers, which another task may have used before.
+type Buffers = (Vec<u32>, Vec<u32>);
 
 /// Collects the contacts that `find` adds for each of `things` in their order, for any number of threads.
 fn collect_in_order(
     things: &[u32],
     out: &mut Vec<Contact>,
-    find: impl Fn(u32, &mut Scratch, &mut Vec<Contact>) + Sync,
+    find: impl Fn(u32, &mut Buffers, &mut Vec<Contact>) + Sync,
 ) {
-    let unused: Mutex<Vec<Scratch>> = Mutex::default();
+    let unused: Mutex<Vec<Buffers>> = Mutex::default();
     let lock = || unused.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let parts = parallel::map(things.chunks(TASK), |_, things| {
-        let (mut scratch, mut seen) = (lock().pop().unwrap_or_default(), Vec::new());
-        things.iter().for_each(|thing| find(*thing, &mut scratch, &mut seen));
-        lock().push(scratch);
+        let (mut buffers, mut seen) = (lock().pop().unwrap_or_default(), Vec::new());
+        things.iter().for_each(|thing| find(*thing, &mut buffers, &mut seen));
+        lock().push(buffers);
         seen
     });
     out.extend(parts.into_iter().flatten());
 }
 
-/// Positions of a point in all poses.
-fn path_of(poses: &[Positions<'_>], point: u32, path: &mut Vec<DVec3>) {
-    path.clear();
-    path.extend(poses.iter().map(|pose| DVec3::from(pose[point as usize])));
-}
-
 impl SkinObstaclePair<'_> {
     /// Particles of the skin against triangles of the obstacle.
-    fn particles(&self, tree: &SweptBoxTree<'_>, out: &mut Vec<Contact>) {
+    fn particles(&self, tree: &SweptBoxTree<'_>, released: &ReleasedElements, out: &mut Vec<Contact>) {
         let bounds = tree.bounds;
         // Made before the loop: a thread of the pool that waits for another's tree could wait forever.
-        let solid = self.solid_at_start(&bounds);
-        collect_in_order(&self.skin.touching, out, |particle, Scratch { others: faces, path, .. }, out| {
-            if has(&self.released.particles, particle) {
+        let solid = self.solid_at_start(released, &bounds);
+        collect_in_order(&self.skin.touching, out, |particle, (faces, _), out| {
+            if has(&released.particles, particle) {
                 return;
             }
             let (own, entry) = (&self.boxes[0][particle as usize], self.entry(particle));
@@ -323,9 +306,9 @@ impl SkinObstaclePair<'_> {
             if faces.is_empty() && entry.is_none() && !(solid.is_some() && swept::overlap(own, &bounds)) {
                 return;
             }
-            path_of(self.body.poses, particle, path);
+            let path = self.body.path(particle);
             let closest_at_start = || self.closest_at_start(solid.as_ref()?, &bounds, path[0]);
-            for hit in vertex::hits(path, &self.still, (faces, entry), &closest_at_start, &self.rules) {
+            for hit in vertex::hits(&path, &self.still, (faces, entry), &closest_at_start, &self.rules) {
                 let corners = &self.obstacle.surface.triangles[hit.face as usize];
                 let sides = [(&[particle][..], &[1.0][..]), (corners, &hit.weights)];
                 out.push(self.contact(sides, hit.normal, hit.shift));
@@ -335,16 +318,12 @@ impl SkinObstaclePair<'_> {
 
     /// The obstacle's triangles at the start of the motion, where it has an inside and a particle may be in it: within
     /// its `bounds`.
-    fn solid_at_start(&self, bounds: &Cuboid) -> Option<TriangleTree> {
+    fn solid_at_start(&self, released: &ReleasedElements, bounds: &Cuboid) -> Option<TriangleTree> {
         let may_be_inside = |particle: &u32| {
-            !has(&self.released.particles, *particle) && swept::overlap(&self.boxes[0][*particle as usize], bounds)
+            !has(&released.particles, *particle) && swept::overlap(&self.boxes[0][*particle as usize], bounds)
         };
-        if !self.obstacle.surface.closed || !self.skin.touching.iter().any(may_be_inside) {
-            return None;
-        }
-        let mut tree = self.obstacle.solid.clone();
-        tree.refit(&obstacle::narrow(self.still.poses[0]));
-        Some(tree)
+        let needed = self.obstacle.surface.closed && self.skin.touching.iter().any(may_be_inside);
+        needed.then(|| self.obstacle.solid.moved(&obstacle::narrow(self.still.poses[0])))
     }
 
     /// The triangle of `solid` closest to the `start` of a motion, for a particle within the `bounds` of the obstacle.
@@ -358,15 +337,15 @@ impl SkinObstaclePair<'_> {
     }
 
     /// Sharp points of the obstacle against triangles of the skin.
-    fn points(&self, tree: &SweptBoxTree<'_>, out: &mut Vec<Contact>) {
-        collect_in_order(&self.obstacle.sharp_points, out, |point, Scratch { others: faces, path, .. }, out| {
+    fn points(&self, tree: &SweptBoxTree<'_>, released: &ReleasedElements, out: &mut Vec<Contact>) {
+        collect_in_order(&self.obstacle.sharp_points, out, |point, (faces, _), out| {
             tree.overlapping(&swept::inflated(&self.boxes[1][point as usize], self.rules.reach), faces);
-            faces.retain(|face| !has(&self.released.faces, *face));
+            faces.retain(|face| !has(&released.faces, *face));
             if faces.is_empty() {
                 return;
             }
-            path_of(self.still.poses, point, path);
-            for hit in vertex::hits(path, &self.body, (faces, None), &|| None, &self.rules) {
+            let path = self.still.path(point);
+            for hit in vertex::hits(&path, &self.body, (faces, None), &|| None, &self.rules) {
                 let corners = &self.skin.surface.triangles[hit.face as usize];
                 let sides = [(&corners[..], &hit.weights[..]), (&[point], &[1.0])];
                 out.push(self.contact(sides, -hit.normal, hit.shift));
@@ -375,11 +354,11 @@ impl SkinObstaclePair<'_> {
     }
 
     /// Edges of the skin against sharp edges of the obstacle.
-    fn edges(&self, out: &mut Vec<Contact>) {
+    fn edges(&self, released: &ReleasedElements, out: &mut Vec<Contact>) {
         let tree = self.obstacle.edges.sweep(self.boxes[1], self.rules.reach);
         let indices: Vec<u32> = (0..self.skin.surface.edges.len() as u32).collect();
-        collect_in_order(&indices, out, |index, Scratch { others, .. }, out| {
-            if has(&self.released.edges, index) {
+        collect_in_order(&indices, out, |index, (others, _), out| {
+            if has(&released.edges, index) {
                 return;
             }
             let edge = &self.skin.surface.edges[index as usize];

@@ -14,7 +14,7 @@
 
 use super::solid::Solid;
 use super::surface::{Moment, TriangleSurface};
-use super::{ActOnPair, Closeness, CollisionScene, Yielding};
+use super::{ActOnPair, Closeness, CollisionScene, ReleasedElements, Yielding};
 use crate::mass_spring::{Contact, ContactFinder, ContactQuery, Weighted};
 use crate::tets::{Enclosure, Exit};
 use numerics::closest_point::ClosestPoint;
@@ -72,8 +72,8 @@ pub struct Separation<'a> {
     pub seconds: f64,
 }
 
-/// Which particles are being pushed out of obstacles, by the indices of their skin and of the obstacle.
-type Pushed = BTreeMap<(usize, usize), Vec<bool>>;
+/// What obstacles release as it is being pushed out of them, by the indices of the skin and of the obstacle.
+type Pushed = BTreeMap<(usize, usize), ReleasedElements>;
 
 /// Where bodies are, relative to what should keep them out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -242,9 +242,9 @@ impl CollisionScene<'_> {
 
     /// Contacts without friction of the pairs that are being pushed apart; returns what is pushed out of obstacles.
     pub(super) fn separate(&self, query: &ContactQuery<'_>, act: &mut ActOnPair<'_>) -> Pushed {
-        let mut all_pushed = Pushed::new();
+        let mut pushed = Pushed::new();
         if self.separated().is_empty() {
-            return all_pushed;
+            return pushed;
         }
         let boxes = swept::swept_boxes(&[query.from]);
         let [skins, obstacles] = self.solids(query.from, &boxes, query.times[0]);
@@ -257,7 +257,7 @@ impl CollisionScene<'_> {
             let (gap, direction) = (other.gap, DVec3::from(overlap.direction));
             let end = obstacle.map(|obstacle| obstacle.at(query.times[1]));
             let [first, other] = [&skins[overlap.skin], other].map(|of| Side::new(of, [gap, 0.0]));
-            let (mut contacts, mut pushed) = (Vec::new(), vec![false; query.from.len()]);
+            let (mut contacts, mut particles) = (Vec::new(), vec![false; query.from.len()]);
             for (own, [inner, outer], normal) in
                 [(true, [&first, &other], direction), (false, [&other, &first], -direction)]
             {
@@ -277,16 +277,16 @@ impl CollisionScene<'_> {
                     };
                     contacts.push(self.allowed(overlap, exit.distance + gap, query.times).of(contact));
                     if own {
-                        pushed[exit.point as usize] = true;
+                        particles[exit.point as usize] = true;
                     }
                 }
             }
             act(overlap.skin, Some(overlap.partner), contacts);
             if let OverlapPartner::Obstacle(index) = overlap.partner {
-                all_pushed.insert((overlap.skin, index), pushed);
+                pushed.insert((overlap.skin, index), ReleasedElements { particles, ..Default::default() });
             }
         }
-        all_pushed
+        pushed
     }
 
     /// Where contact points at `x` are at the end of the frame.

@@ -3,7 +3,7 @@
 use super::body_skin::BodySkin;
 use super::edge;
 use super::vertex::{self, ContactRules, MovingSurface};
-use super::{ActOnPair, CollisionScene, OverlapPartner, REACH, Scratch, Yielding, collect_in_order};
+use super::{ActOnPair, Buffers, CollisionScene, OverlapPartner, REACH, Yielding, collect_in_order};
 use crate::mass_spring::{Contact, ContactQuery, Weighted};
 use numerics::swept::{self, SweptBoxTree};
 use numerics::tree::Cuboid;
@@ -35,31 +35,20 @@ struct Pair<'a> {
     yielding: Yielding,
 }
 
-/// Marks the neighbourhood of some points, by the number of the query that marked them last.
-#[derive(Default)]
-pub(super) struct Marks {
-    of: Vec<u32>,
-    last: u32,
-}
-
-impl Marks {
-    fn put(&mut self, skin: &BodySkin, particles: &[u32]) {
-        if self.of.is_empty() || self.last == u32::MAX {
-            self.of = vec![0; skin.len()];
-            self.last = 0;
-        }
-        self.last += 1;
-        for other in particles.iter().flat_map(|particle| skin.around(*particle)) {
-            self.of[*other as usize] = self.last;
-        }
-    }
-
-    fn have(&self, skin: &BodySkin, points: &[u32]) -> bool {
-        let marked = |point: &u32| self.of[*point as usize] == self.last;
-        points
-            .iter()
-            .any(|point| if skin.rides(*point) { skin.around(*point).iter().any(marked) } else { marked(point) })
-    }
+/// Drops those of `others` that have a point near the `points` of an element, by links of the skin. What is near these is marked
+/// with the `index` of the element.
+fn drop_neighbours<'a>(
+    skin: &BodySkin,
+    (index, points): (u32, &[u32]),
+    (others, marks): &mut Buffers,
+    points_of: impl Fn(u32) -> &'a [u32],
+) {
+    marks.resize(skin.rest.len(), 0);
+    points.iter().flat_map(|point| skin.around(*point)).for_each(|near| marks[*near as usize] = index + 1);
+    let is_marked = |point: &u32| marks[*point as usize] == index + 1;
+    let is_near =
+        |point: &u32| if skin.rides(*point) { skin.around(*point).iter().any(is_marked) } else { is_marked(point) };
+    others.retain(|other| !points_of(*other).iter().any(is_near));
 }
 
 /// Swept boxes of a skin.
@@ -76,24 +65,24 @@ impl CollisionScene<'_> {
         let boxes = |reach: f64| -> Vec<Boxes<'_>> {
             let of = self.skins.iter().map(|skin| Boxes {
                 bounds: swept::inflated(&swept::bounds_of_finite(&skin.touching, points), reach),
-                faces: skin.faces.sweep(points, reach),
+                faces: skin.surface.swept.sweep(points, reach),
                 edges: skin.edges.sweep(points, reach),
             });
             of.collect()
         };
-        let pair = |skins: [usize; 2], self_contact: bool, params: ContactParams| Pair {
-            scene: self,
-            query,
-            points,
-            skins: skins.map(|skin| &self.skins[skin]),
-            self_contact,
-            params,
-            rules: ContactRules { gap: params.thickness, reach: REACH * params.thickness, push: !self_contact },
-            yielding: self.yielding(
-                skins[0].min(skins[1]),
-                (!self_contact).then(|| OverlapPartner::Skin(skins[0].max(skins[1]))),
-                query.times,
-            ),
+        let pair = |[first, second]: [usize; 2], params: ContactParams| {
+            let self_contact = first == second;
+            let partner = (!self_contact).then_some(OverlapPartner::Skin(first.max(second)));
+            Pair {
+                scene: self,
+                query,
+                points,
+                skins: [first, second].map(|skin| &self.skins[skin]),
+                self_contact,
+                params,
+                rules: ContactRules { gap: params.thickness, reach: REACH * params.thickness, push: !self_contact },
+                yielding: self.yielding(first.min(second), partner, query.times),
+            }
         };
         if let Some(params) = self.body_contact.filter(|_| self.skins.len() > 1) {
             let boxes = boxes(REACH * params.thickness);
@@ -103,9 +92,9 @@ impl CollisionScene<'_> {
                     let partner = OverlapPartner::Skin(second);
                     if meet && self.separating(first, partner).is_none() {
                         let mut contacts = Vec::new();
-                        pair([first, second], false, params).particles(&boxes[second], &mut contacts);
-                        pair([second, first], false, params).particles(&boxes[first], &mut contacts);
-                        pair([first, second], false, params).edges(&boxes[second], &mut contacts);
+                        pair([first, second], params).particles(&boxes[second], &mut contacts);
+                        pair([second, first], params).particles(&boxes[first], &mut contacts);
+                        pair([first, second], params).edges(&boxes[second], &mut contacts);
                         act(first, Some(partner), contacts);
                     }
                 }
@@ -113,7 +102,7 @@ impl CollisionScene<'_> {
         }
         if let Some(params) = self.self_contact {
             for (skin, boxes) in boxes(REACH * params.thickness).iter().enumerate() {
-                let (pair, mut contacts) = (pair([skin, skin], true, params), Vec::new());
+                let (pair, mut contacts) = (pair([skin, skin], params), Vec::new());
                 pair.particles(boxes, &mut contacts);
                 pair.edges(boxes, &mut contacts);
                 act(skin, None, contacts);
@@ -129,12 +118,13 @@ impl Pair<'_> {
         let [first, second] = self.skins;
         let on = MovingSurface { surface: &second.surface, poses: &poses };
         let particles = if self.self_contact { &first.surface.vertices } else { &first.touching };
-        collect_in_order(particles, out, |particle, Scratch { others: faces, marks, .. }, out| {
-            boxes.faces.overlapping(&self.points[particle as usize], faces);
+        collect_in_order(particles, out, |particle, buffers, out| {
+            boxes.faces.overlapping(&self.points[particle as usize], &mut buffers.0);
             if self.self_contact {
-                marks.put(first, &[particle]);
-                faces.retain(|face| !marks.have(first, &first.surface.triangles[*face as usize]));
+                let corners = |face: u32| &first.surface.triangles[face as usize][..];
+                drop_neighbours(first, (particle, &[particle]), buffers, corners);
             }
+            let faces = &buffers.0;
             if faces.is_empty() {
                 return;
             }
@@ -153,15 +143,14 @@ impl Pair<'_> {
         let [first, second] = self.skins;
         let [one, two] = [first, second].map(|skin| MovingSurface { surface: &skin.surface, poses: &poses });
         let indices: Vec<u32> = (0..first.surface.edges.len() as u32).collect();
-        collect_in_order(&indices, out, |index, Scratch { others, marks, .. }, out| {
+        collect_in_order(&indices, out, |index, buffers, out| {
             let edge = &first.surface.edges[index as usize];
-            boxes.edges.overlapping(&swept::bounds_of(&edge.ends, self.points), others);
+            boxes.edges.overlapping(&swept::bounds_of(&edge.ends, self.points), &mut buffers.0);
             if self.self_contact {
-                marks.put(first, &edge.ends);
-                let ends = |other: &u32| &first.surface.edges[*other as usize].ends;
-                others.retain(|other| *other > index && !marks.have(first, ends(other)));
+                buffers.0.retain(|other| *other > index);
+                drop_neighbours(first, (index, &edge.ends), buffers, |other| &first.surface.edges[other as usize].ends);
             }
-            for at in others {
+            for at in &buffers.0 {
                 let other = &second.surface.edges[*at as usize];
                 if let Some(hit) = edge::hit([&one, &two], [edge, other], &self.rules) {
                     let sides = [(&edge.ends[..], &hit.weights[0][..]), (&other.ends, &hit.weights[1])];

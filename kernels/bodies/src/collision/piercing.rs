@@ -69,24 +69,20 @@ impl CollisionScene<'_> {
     pub fn self_crossings(&self, x: &[[f64; 3]]) -> usize {
         let (boxes, at) = (swept::swept_boxes(&[x]), Moment::of(x));
         let of_skin = |skin: &BodySkin| -> usize {
-            let (surface, tree, rest) = (&skin.surface, skin.faces.sweep(&boxes, 0.0), Moment::of(&skin.rest));
+            let (surface, tree, rest) = (&skin.surface, skin.surface.swept.sweep(&boxes, 0.0), Moment::of(&skin.rest));
             let crosses = |edge: &Edge, face: u32, at: &Moment<'_>| {
                 crossing(edge.ends.map(|end| at.position(end)), surface.corners(at, face)).is_some()
             };
-            let goes_through = |edge: &Edge, faces: &[u32]| {
-                let through = faces.iter().any(|face| {
+            let crossed = surface.each_edge(&surface.edge_indices(), &boxes, &tree, |_, edge, faces| {
+                let goes_through = |face: &u32| {
                     let corners = surface.triangles[*face as usize];
                     !edge.ends.iter().any(|end| corners.contains(end))
                         && crosses(edge, *face, &at)
                         && !crosses(edge, *face, &rest)
-                });
-                through.then_some(())
-            };
-            surface
-                .each_edge(&surface.edge_indices(), &boxes, &tree, |edge, faces| {
-                    goes_through(&surface.edges[edge as usize], faces)
-                })
-                .len()
+                };
+                faces.iter().copied().find(goes_through)
+            });
+            crossed.len()
         };
         self.skins.iter().map(of_skin).sum()
     }
@@ -97,18 +93,18 @@ impl CollisionScene<'_> {
         let (skin, obstacle) = (&self.skins[skin], &self.obstacles[obstacle]);
         let points = obstacle.at(1.0);
         let [own, boxes] = [swept::swept_boxes(&[x]), swept::swept_boxes(&[&points])];
-        let tree = obstacle.faces.sweep(&boxes, 0.0);
+        let tree = obstacle.surface.swept.sweep(&boxes, 0.0);
         if !swept::overlap(&swept::bounds_of_finite(&skin.surface.vertices, &own), &tree.bounds) {
             return Vec::new();
         }
         let at = Moment::of(&points);
         let surface = &skin.surface;
-        surface.each_edge(&surface.edge_indices(), &own, &tree, |edge, faces| {
-            let ends = surface.edges[edge as usize].ends.map(|end| DVec3::from(x[end as usize]));
+        surface.each_edge(&surface.edge_indices(), &own, &tree, |index, edge, faces| {
+            let ends = edge.ends.map(|end| DVec3::from(x[end as usize]));
             let met = |face: &u32| Some((crossing(ends, obstacle.surface.corners(&at, *face))?.0, *face));
             let mut met: Vec<(f64, u32)> = faces.iter().filter_map(met).collect();
             met.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            Some((edge as usize, [met.first()?.1, met.last()?.1]))
+            Some((index as usize, [met.first()?.1, met.last()?.1]))
         })
     }
 }
@@ -118,20 +114,21 @@ impl TriangleSurface {
         (0..self.edges.len() as u32).collect()
     }
 
-    /// What `find` makes of some edges, by index, and of the triangles near them among those of a `tree`. `boxes` are those of
-    /// the points.
+    /// What `find` makes of some edges, with their indices, and of the triangles near them among those of a `tree`. `boxes` are
+    /// those of the points.
     fn each_edge<R: Send>(
         &self,
         edges: &[u32],
         boxes: &[Cuboid],
         tree: &SweptBoxTree<'_>,
-        find: impl Fn(u32, &[u32]) -> Option<R> + Sync,
+        find: impl Fn(u32, &Edge, &[u32]) -> Option<R> + Sync,
     ) -> Vec<R> {
         parallel::concat(parallel::map(edges.chunks(TASK), |_, edges| {
             let mut faces = Vec::new();
-            let found = edges.iter().filter_map(|edge| {
-                tree.overlapping(&swept::bounds_of(&self.edges[*edge as usize].ends, boxes), &mut faces);
-                find(*edge, &faces)
+            let found = edges.iter().filter_map(|index| {
+                let edge = &self.edges[*index as usize];
+                tree.overlapping(&swept::bounds_of(&edge.ends, boxes), &mut faces);
+                find(*index, edge, &faces)
             });
             found.collect()
         }))
@@ -148,16 +145,17 @@ impl Solid<'_> {
 
     /// The largest distance below the surface of `other` that some of its edges reach.
     fn reaches(&self, edges: &[u32], other: &Solid<'_>) -> f64 {
-        let tree = other.faces.sweep(&other.boxes, 0.0);
-        let pierced = self.surface.each_edge(edges, &self.boxes, &tree, |edge, faces| self.pierce(edge, other, faces));
+        let tree = other.surface.swept.sweep(&other.boxes, 0.0);
+        let pierced =
+            self.surface.each_edge(edges, &self.boxes, &tree, |_, edge, faces| self.pierce(edge, other, faces));
         let deepest = pierced.iter().map(|pierced| pierced.deepest).fold(0.0, f64::max);
         let within: Vec<[f64; 3]> = pierced.into_iter().flat_map(|pierced| pierced.within).collect();
         other.distances(&within).into_iter().flatten().fold(deepest, f64::max)
     }
 
     /// How far an edge is in `other`, which it may cross at some `faces`.
-    fn pierce(&self, edge: u32, other: &Solid<'_>, faces: &[u32]) -> Option<Pierced> {
-        let [p, q] = self.surface.edges[edge as usize].ends.map(|end| DVec3::from(self.points[end as usize]));
+    fn pierce(&self, edge: &Edge, other: &Solid<'_>, faces: &[u32]) -> Option<Pierced> {
+        let [p, q] = edge.ends.map(|end| DVec3::from(self.points[end as usize]));
         let (at, mut pierced) = (Moment::of(&other.points), Pierced::default());
         // Where it goes in, and where it comes out.
         let mut crossed: Vec<(f64, bool)> = Vec::new();

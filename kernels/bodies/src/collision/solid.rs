@@ -3,7 +3,7 @@
 use super::obstacle::narrow;
 use super::surface::TriangleSurface;
 use super::{CollisionScene, OverlapPartner};
-use numerics::swept::{self, SweptElements};
+use numerics::swept;
 use numerics::tree::{Cuboid, TriangleTree};
 use std::borrow::Cow;
 
@@ -12,7 +12,6 @@ use std::borrow::Cow;
 pub(super) struct Solid<'a> {
     pub(super) is: OverlapPartner,
     pub(super) surface: &'a TriangleSurface,
-    pub(super) faces: &'a SweptElements<3>,
     pub(super) points: Cow<'a, [[f64; 3]]>,
     /// Boxes of the points.
     pub(super) boxes: Cow<'a, [Cuboid]>,
@@ -44,7 +43,6 @@ impl CollisionScene<'_> {
         let skins = self.skins.iter().enumerate().map(|(index, skin)| Solid {
             is: OverlapPartner::Skin(index),
             surface: &skin.surface,
-            faces: &skin.faces,
             points: x.into(),
             boxes: boxes.into(),
             candidates: &skin.touching,
@@ -57,7 +55,6 @@ impl CollisionScene<'_> {
             Solid {
                 is: OverlapPartner::Obstacle(index),
                 surface: &obstacle.surface,
-                faces: &obstacle.faces,
                 points: points.into(),
                 candidates: &obstacle.surface.vertices,
                 bounds: swept::bounds_of_finite(&obstacle.surface.vertices, &boxes),
