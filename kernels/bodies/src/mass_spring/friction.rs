@@ -85,7 +85,7 @@ impl BodySolver {
     pub(super) fn balance(&self, stage: &Stage<'_>, x: &[DVec3]) -> LoadBalance {
         let body = stage.context.body;
         let mut pieces = vec![PieceLoads::default(); body.order.pieces.len()];
-        for contact in stage.contacts.iter().filter(|contact| contact.friction > 0.0) {
+        for contact in stage.contacts.iter().filter(|contact| contact.of.friction > 0.0) {
             let now = contact.load_at(x, 0.0);
             let mut last = usize::MAX;
             for (particle, weight) in contact.sides() {

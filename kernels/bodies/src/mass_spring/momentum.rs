@@ -80,7 +80,7 @@ impl BodySolver {
                 Some(ObstacleContact {
                     group,
                     contact: index,
-                    weight: contact.point_weights.iter().sum(),
+                    weight: contact.of.weights.iter().sum(),
                     directions: contact.stiffness_directions(state, stage.a).collect(),
                 })
             });
