@@ -33,10 +33,8 @@ const FLAT: f64 = 1e-6;
 
 /// The mean of a masked number over some particles, clamped to be non-negative.
 fn mean_over<const N: usize>(number: &Masked<'_, f64>, particles: [u32; N]) -> f64 {
-    let scale = number.mask.map_or(1.0, |mask| {
-        particles.iter().map(|particle| f64::from(mask[*particle as usize])).sum::<f64>() / N as f64
-    });
-    (number.value * scale).max(0.0)
+    let factors = particles.map(|particle| f64::from(number.factor(particle as usize)));
+    (number.value * (factors.iter().sum::<f64>() / N as f64)).max(0.0)
 }
 
 /// A tetrahedral mesh at rest.

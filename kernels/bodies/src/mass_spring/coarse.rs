@@ -57,12 +57,8 @@ impl ContactFilters {
             if resisted.iter().all(|column| column.amax() < NEGLIGIBLE) {
                 continue;
             }
-            let filter = std::array::from_fn(|k| {
-                let mut column = -resisted[k];
-                column[k] += 1.0;
-                column.into()
-            });
-            filters.insert(particle, system.inertia.len(), filter);
+            let filter = DMat3::identity() - DMat3::from_columns(&resisted);
+            filters.insert(particle, system.inertia.len(), filter.data.0);
         }
         filters
     }
@@ -119,9 +115,8 @@ impl Layout {
             let [_, across] = adjacency.of(particle, &adjacency.incident);
             across.iter().for_each(|incident| layout.join(&mut first, [particle, incident.other as usize].into_iter()));
         }
-        for ends in regions.starts.windows(2) {
-            let particles = &regions.particles[ends[0] as usize..ends[1] as usize];
-            layout.join(&mut first, particles.iter().map(|particle| *particle as usize));
+        for region in 0..regions.len() {
+            layout.join(&mut first, regions.of(region).iter().map(|particle| *particle as usize));
         }
         layout.first = first;
         layout

@@ -166,7 +166,8 @@ impl BodySolver {
         self.system.regions.idle = self.volumes.is_disabled();
         springs::particle_stiffness(body, &rest, &mut self.particle_stiffness);
         self.heaps = heaps(body, external.at(1.0).gravity);
-        self.system.set_loose(&external.held, &self.particle_stiffness);
+        self.system.held.clone_from(&external.held);
+        self.system.isolated = self.particle_stiffness.iter().map(|k| *k == 0.0).collect();
         let context =
             FrameContext { body, external: &external, rest, volumes: &state.volumes, cancelled: frame.cancelled };
         state.acceleration.resize(body.len(), [0.0; 3]);

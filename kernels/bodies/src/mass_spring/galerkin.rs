@@ -193,17 +193,11 @@ fn write(blocks: &[Block], out: &mut [f64]) {
     }
 }
 
-/// The cross product matrix −r×, which maps a rotation vector to the displacement at `r`.
-#[inline(always)]
-fn turn(r: DVec3) -> DMat3 {
-    DMat3::new(0.0, r.z, -r.y, -r.z, 0.0, r.x, r.y, -r.x, 0.0)
-}
-
 /// Displacement at `offset` for translations and rotations, filtered.
 #[inline(always)]
 fn motion(filter: Option<DMat3>, offset: DVec3) -> [DMat3; 2] {
     let shift = filter.unwrap_or_else(DMat3::identity);
-    [shift, shift * turn(offset)]
+    [shift, shift * offset.cross_matrix().transpose()]
 }
 
 /// Coupling of the rigid motions of two clusters.

@@ -39,11 +39,12 @@ impl ContactScale<'_> {
 
 /// Whether each particle is of a heap under `gravity`, m/s²; empty if none is.
 pub(super) fn heaps(body: &SoftBody, gravity: DVec3) -> Vec<bool> {
-    let ratios = body.stiffness_to_weights(gravity);
-    if !ratios.iter().any(|ratio| *ratio < HEAP) {
-        return Vec::new();
+    let mut heaps = Vec::new();
+    for (piece, ratio) in body.pieces().zip(body.stiffness_to_weights(gravity)) {
+        if ratio < HEAP {
+            heaps.resize(body.len(), false);
+            heaps[piece].fill(true);
+        }
     }
-    let mut heaps = vec![false; body.len()];
-    body.pieces().zip(ratios).for_each(|(piece, ratio)| heaps[piece].fill(ratio < HEAP));
     heaps
 }

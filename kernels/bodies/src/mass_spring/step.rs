@@ -306,11 +306,8 @@ pub(super) fn sum(a: Solved, b: Solved) -> Solved {
         cg: a.cg + b.cg,
         caps: a.caps + b.caps,
         residual: a.residual.max(b.residual),
-        first: b.first,
         failed: a.failed || b.failed,
         enough: a.enough.max(b.enough),
-        unmet: b.unmet,
-        passed: b.passed,
-        deepest: b.deepest,
+        ..b
     }
 }
