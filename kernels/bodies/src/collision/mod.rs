@@ -115,23 +115,17 @@ impl ContactFinder for CollisionScene<'_> {
     }
 
     fn least_steps(&self, query: &ContactQuery<'_>) -> u32 {
-        let mut least = 1;
-        for obstacle in self.obstacles {
-            let steps = (obstacle.motion.turn(query.times) / FARTHEST_TURN).ceil() as u32;
-            if steps <= least {
-                continue;
-            }
+        let steps = |obstacle: &Obstacle| (obstacle.motion.turn(query.times) / FARTHEST_TURN).ceil() as u32;
+        let is_near = |obstacle: &&Obstacle| {
             let poses = obstacle.motion.times(query.times, SAG * obstacle.thickness);
             let poses: Vec<Vec<[f64; 3]>> = poses.iter().map(|time| obstacle.at(*time)).collect();
             let passed = swept::swept_boxes(&poses.iter().map(Vec::as_slice).collect::<Vec<_>>());
             let passed = swept::bounds_of_finite(&obstacle.surface.vertices, &passed);
             let boxes = swept::swept_boxes(&[query.from, query.to]);
-            let is_near = |skin: &BodySkin| swept::overlap(&swept::bounds_of_finite(&skin.touching, &boxes), &passed);
-            if self.skins.iter().any(is_near) {
-                least = steps;
-            }
-        }
-        least
+            self.skins.iter().any(|skin| swept::overlap(&swept::bounds_of_finite(&skin.touching, &boxes), &passed))
+        };
+        let turning = self.obstacles.iter().filter(|obstacle| steps(obstacle) > 1);
+        turning.filter(is_near).map(steps).max().unwrap_or(1)
     }
 }
 
