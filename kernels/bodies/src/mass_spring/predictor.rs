@@ -31,7 +31,8 @@ pub(super) struct RigidMotion {
 }
 
 impl RigidMotion {
-    /// The rigid motion with the momenta of the `particles` of a piece, by positions, velocities and accelerations of particles; at rest if it has particles that are `held`.
+    /// The rigid motion with the momenta of the `particles` of a piece, by positions, velocities and accelerations; at rest if
+    /// some of them are `held`.
     pub(super) fn new(body: &SoftBody, held: &[bool], particles: Range<usize>, motion: [&[DVec3]; 3]) -> Self {
         let still = Self { particles: particles.clone(), ..Self::default() };
         if held[particles.clone()].contains(&true) {
