@@ -36,27 +36,18 @@ impl ClusterOrder {
     /// The order for particles at `points`, joined by `springs`.
     pub fn new(points: &[DVec3], springs: impl Iterator<Item = [u32; 2]> + Clone) -> Self {
         let roots = pieces(points.len(), springs.clone());
-        // Pieces by their lowest particle, particles within a piece by index.
-        let mut caller_of: Vec<u32> = (0..points.len() as u32).collect();
-        caller_of.sort_by_key(|particle| (roots[*particle as usize], *particle));
         let wanted = CLUSTERS * libm::pow(points.len() as f64, GROWTH);
-        let (mut starts, mut ranges, mut first) = (vec![0], Vec::new(), 0);
-        while first < caller_of.len() {
-            let root = roots[caller_of[first] as usize];
-            let count = caller_of[first..].iter().take_while(|particle| roots[**particle as usize] == root).count();
+        let clusters = |count: usize| {
             let share = (wanted * count as f64 / points.len() as f64) as usize;
-            let clusters = share.clamp(1, (count / SMALLEST).max(1));
-            let before = starts.len() - 1;
-            halve(points, &mut caller_of[first..first + count], clusters, first, &mut starts);
-            ranges.push(before..starts.len() - 1);
-            first += count;
-        }
-        let (caller_of, starts) = reordered(&caller_of, &starts, &ranges, springs);
+            share.clamp(1, (count / SMALLEST).max(1))
+        };
+        let CompactSets { items, starts, groups } = CompactSets::new(points, &roots, LEAF, clusters);
+        let (caller_of, starts) = reordered(&items, &starts, &groups, springs);
         let mut index_of = vec![0; points.len()];
         for (index, caller) in caller_of.iter().enumerate() {
             index_of[*caller as usize] = index as u32;
         }
-        Self { caller_of, index_of, clusters: Partition::new(starts), pieces: ranges }
+        Self { caller_of, index_of, clusters: Partition::new(starts), pieces: groups }
     }
 }
 
@@ -117,31 +108,58 @@ fn breadth_first(joined: &[Vec<usize>], first: usize, met: &mut [bool]) -> Vec<u
     line
 }
 
-/// Orders `particles` and appends the ends of their `clusters` to `starts`; `base` is the index of the first
-/// particle.
-fn halve(points: &[DVec3], particles: &mut [u32], clusters: usize, base: usize, starts: &mut Vec<usize>) {
-    let count = particles.len();
-    if clusters <= 1 && count <= LEAF {
-        particles.sort_unstable();
+/// Items in compact sets of equal size, by recursive median splits.
+pub struct CompactSets {
+    /// The items, set by set.
+    pub items: Vec<u32>,
+    /// Start of each set among them, and the end of the last.
+    pub starts: Vec<usize>,
+    /// The sets of each group.
+    pub groups: Vec<Range<usize>>,
+}
+
+impl CompactSets {
+    /// The items at `points`, group by group, and each group in as many sets, one or more, as `sets` gives for its size. Groups
+    /// have different `roots`, and are in their order. Further splits order what is in sets of more than `leaf` items;
+    /// others are in order.
+    pub fn new(points: &[DVec3], roots: &[u32], leaf: usize, sets: impl Fn(usize) -> usize) -> Self {
+        let mut items: Vec<u32> = (0..points.len() as u32).collect();
+        items.sort_by_key(|item| (roots[*item as usize], *item));
+        let (mut starts, mut groups, mut first) = (vec![0], Vec::new(), 0);
+        for group in items.chunk_by_mut(|a, b| roots[*a as usize] == roots[*b as usize]) {
+            let before = starts.len() - 1;
+            halve(points, group, (sets(group.len()), leaf), first, &mut starts);
+            groups.push(before..starts.len() - 1);
+            first += group.len();
+        }
+        Self { items, starts, groups }
+    }
+}
+
+/// Orders `items` and appends the ends of their `sets` to `starts`; `base` is the index of the first item.
+fn halve(points: &[DVec3], items: &mut [u32], (sets, leaf): (usize, usize), base: usize, starts: &mut Vec<usize>) {
+    let count = items.len();
+    if sets <= 1 && count <= leaf {
+        items.sort_unstable();
     } else {
-        let middle = if clusters > 1 { count * (clusters / 2) / clusters } else { count / 2 };
-        split(points, particles, middle);
-        let (left, right) = particles.split_at_mut(middle);
-        if clusters > 1 {
-            halve(points, left, clusters / 2, base, starts);
-            return halve(points, right, clusters - clusters / 2, base + middle, starts);
+        let middle = if sets > 1 { count * (sets / 2) / sets } else { count / 2 };
+        split(points, items, middle);
+        let (left, right) = items.split_at_mut(middle);
+        if sets > 1 {
+            halve(points, left, (sets / 2, leaf), base, starts);
+            return halve(points, right, (sets - sets / 2, leaf), base + middle, starts);
         }
         let nowhere = &mut Vec::new();
-        halve(points, left, 0, base, nowhere);
-        halve(points, right, 0, base + middle, nowhere);
+        halve(points, left, (0, leaf), base, nowhere);
+        halve(points, right, (0, leaf), base + middle, nowhere);
     }
-    if clusters == 1 {
+    if sets == 1 {
         starts.push(base + count);
     }
 }
 
 /// Partitions `items` so that the `middle` lowest along the longest side of their bounding box come first.
-pub fn split(points: &[DVec3], items: &mut [u32], middle: usize) {
+fn split(points: &[DVec3], items: &mut [u32], middle: usize) {
     let mut low = DVec3::repeat(f64::INFINITY);
     let mut high = -low;
     for item in items.iter() {

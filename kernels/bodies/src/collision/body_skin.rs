@@ -20,7 +20,6 @@ const INSIDE: f64 = 0.5;
 #[derive(Clone, Debug)]
 pub struct BodySkin {
     pub(super) surface: TriangleSurface,
-    pub(super) faces: SweptElements<3>,
     pub(super) edges: SweptElements<2>,
     pub(super) rest: Vec<[f64; 3]>,
     /// Mean rest length of the edges, metres.
@@ -67,11 +66,11 @@ impl BodySkin {
         let surfaces: Vec<_> = surfaces
             .iter()
             .map(|triangles| {
-                let surface = TriangleSurface::new(rest.len(), triangles);
+                let surface = TriangleSurface::new(rest, triangles);
                 let turn =
                     surface.closed && triangles[0][0] as usize >= particles && signed_volume(triangles, rest) < 0.0;
                 let turned = || triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect::<Vec<_>>();
-                if turn { TriangleSurface::new(rest.len(), &turned()) } else { surface }
+                if turn { TriangleSurface::new(rest, &turned()) } else { surface }
             })
             .collect();
         let edges = surfaces.iter().flat_map(|surface| &surface.edges).map(|edge| edge.ends);
@@ -83,7 +82,6 @@ impl BodySkin {
         let touching = touching(&surfaces, &neighbours, rest, particles);
         let skin = |(surface, touching): (TriangleSurface, Vec<u32>)| Self {
             particles,
-            faces: SweptElements::new(surface.triangles.clone(), rest),
             edges: SweptElements::new(surface.edges.iter().map(|edge| edge.ends).collect(), rest),
             rest: rest.to_vec(),
             mean: surface.edges.iter().map(|edge| edge_length(edge, rest)).sum::<f64>()
@@ -99,11 +97,6 @@ impl BodySkin {
     /// particles within.
     pub fn points(&self) -> &[u32] {
         &self.touching
-    }
-
-    /// Number of contact points of the body, all of its particles included.
-    pub(super) fn len(&self) -> usize {
-        self.rest.len()
     }
 
     /// The volume that a surface that rides along encloses with contact points at `x`, relative to that at rest; `None` if it
@@ -136,7 +129,8 @@ impl BodySkin {
     /// The elements released by obstacles with particles at `x`.
     pub(super) fn released(&self, x: &[[f64; 3]]) -> ReleasedElements {
         let surface = &self.surface;
-        let edges: Vec<bool> = surface.edges.iter().map(|edge| self.is_overstretched(edge, x)).collect();
+        let is_long = |edge: &Edge| edge_length(edge, x) > LONG * edge_length(edge, &self.rest).max(self.mean);
+        let edges: Vec<bool> = surface.edges.iter().map(is_long).collect();
         if !edges.contains(&true) {
             return ReleasedElements::default();
         }
@@ -175,11 +169,7 @@ impl BodySkin {
     /// Number of edges released by obstacles with particles at `x`: those more than eight times as long as at rest
     /// and as the skin's mean edge.
     pub fn released_edges(&self, x: &[[f64; 3]]) -> usize {
-        self.surface.edges.iter().filter(|edge| self.is_overstretched(edge, x)).count()
-    }
-
-    fn is_overstretched(&self, edge: &Edge, x: &[[f64; 3]]) -> bool {
-        edge_length(edge, x) > LONG * edge_length(edge, &self.rest).max(self.mean)
+        self.released(x).edges.iter().filter(|released| **released).count()
     }
 
     /// Distance of two edges at rest, metres.

@@ -11,7 +11,7 @@
 //! Limits: open obstacles have no wrong side; there is no way back below the ground; a body of which most particles are beyond an obstacle is left there.
 
 use super::surface::Moment;
-use super::{CollisionScene, OverlapPartner, ReleasedElements, SkinObstaclePair, vertex};
+use super::{CollisionScene, Ground, OverlapPartner, SkinObstaclePair, vertex};
 use crate::mass_spring::ContactQuery;
 use crate::tets::Enclosure;
 use numerics::pieces::pieces;
@@ -36,26 +36,23 @@ impl CollisionScene<'_> {
     pub fn caught_after(&self, from: &[[f64; 3]], to: &[[f64; 3]]) -> Vec<CaughtParticle> {
         let query = ContactQuery { from, to, times: [0.0, 1.0] };
         let boxes = swept::swept_boxes(&[from, to]);
-        let (mut caught, released) = (Vec::new(), ReleasedElements::default());
-        for obstacle in (0..self.obstacles.len()).filter(|index| self.obstacles[*index].is_closed()) {
+        let mut caught = Vec::new();
+        for obstacle in (0..self.obstacles.len()).filter(|index| self.obstacles[*index].surface.closed) {
             for (index, skin) in self.skins.iter().enumerate() {
                 let mut own = Vec::new();
-                self.against_obstacle(&query, (index, &released), &boxes, obstacle, &mut |meeting, tree| {
-                    let (mut faces, mut path) = (Vec::new(), Vec::new());
-                    for particle in &skin.touching {
-                        super::path_of(meeting.body.poses, *particle, &mut path);
+                self.against_obstacle(&query, index, &boxes, obstacle, &mut |meeting, tree| {
+                    let (mut faces, end) = (Vec::new(), meeting.still.end());
+                    own.extend(skin.touching.iter().filter_map(|particle| {
+                        let path = meeting.body.path(*particle);
                         let entry = meeting.entry(*particle).or_else(|| {
                             tree.overlapping(&boxes[*particle as usize], &mut faces);
                             vertex::entered(&path, &meeting.still, &faces)
                         });
-                        let (surface, end) = (meeting.still.surface, path[path.len() - 1]);
-                        let back = entry.and_then(|face| vertex::way_back(surface, &meeting.still.end(), face, end));
-                        let back = back.filter(|back| !self.is_below_ground(back.point));
-                        own.extend(back.map(|back| CaughtParticle { obstacle, particle: *particle, face: back.face }));
-                    }
+                        self.still_caught(&end, to, CaughtParticle { obstacle, particle: *particle, face: entry? })
+                    }));
                 });
                 self.add_severed((index, obstacle), to, &mut own);
-                if 2 * self.beyond(obstacle, to, &own) <= skin.touching.len() {
+                if !own.is_empty() && 2 * self.beyond(obstacle, to, &own) <= skin.touching.len() {
                     caught.extend(own);
                 }
             }
@@ -93,33 +90,30 @@ impl CollisionScene<'_> {
                 }
             }
         }
-        let own = &self.obstacles[obstacle];
-        let (points, known) = (own.at(1.0), caught.len());
-        for particle in &surface.vertices {
-            let Some(face) = entries[part_of[*particle as usize] as usize] else { continue };
-            let is_known = caught[..known].iter().any(|caught| caught.particle == *particle);
-            let back = vertex::way_back(&own.surface, &Moment::of(&points), face, DVec3::from(x[*particle as usize]));
-            if let Some(back) = back.filter(|back| !is_known && !self.is_below_ground(back.point)) {
-                caught.push(CaughtParticle { obstacle, particle: *particle, face: back.face });
-            }
-        }
+        let known: Vec<u32> = caught.iter().map(|caught| caught.particle).collect();
+        let points = self.obstacles[obstacle].at(1.0);
+        caught.extend(surface.vertices.iter().filter_map(|particle| {
+            let face = entries[part_of[*particle as usize] as usize].filter(|_| !known.contains(particle))?;
+            self.still_caught(&Moment::of(&points), x, CaughtParticle { obstacle, particle: *particle, face })
+        }));
     }
 
-    /// Whether a point is below the ground by more than the distance to keep.
-    fn is_below_ground(&self, point: DVec3) -> bool {
-        self.ground.is_some_and(|ground| DVec3::from(ground.up).dot(&point) < ground.height - ground.thickness)
+    /// A particle that was caught, and now is at `x`: with the triangle that draws it back, if it is not out again on that side
+    /// and there is a way back.
+    fn still_caught(&self, at: &Moment<'_>, x: &[[f64; 3]], caught: CaughtParticle) -> Option<CaughtParticle> {
+        let CaughtParticle { obstacle, particle, face } = caught;
+        let back = vertex::way_back(&self.obstacles[obstacle].surface, at, face, x[particle as usize].into())?;
+        let is_below = |ground: &Ground| DVec3::from(ground.up).dot(&back.point) < ground.height - ground.thickness;
+        let is_free = !self.ground.as_ref().is_some_and(is_below);
+        is_free.then_some(CaughtParticle { face: back.face, ..caught })
     }
 
     /// How many of these particles are not inside an obstacle, but have come out on another side.
     fn beyond(&self, obstacle: usize, x: &[[f64; 3]], caught: &[CaughtParticle]) -> usize {
-        if caught.is_empty() {
-            return 0;
-        }
         let obstacle = &self.obstacles[obstacle];
-        let particles: Vec<u32> = caught.iter().map(|caught| caught.particle).collect();
-        let mut inside = vec![false; x.len()];
-        Enclosure::new(&obstacle.at(1.0), &obstacle.surface.triangles, 0.0).mark(x, &particles, &mut inside);
-        particles.iter().filter(|particle| !inside[**particle as usize]).count()
+        let particles = caught.iter().map(|caught| caught.particle).collect();
+        let solid = Enclosure::new(&obstacle.at(1.0), &obstacle.surface.triangles, 0.0);
+        caught.len() - solid.within(x, particles).len()
     }
 
     /// Those of an obstacle, by particle.

@@ -5,7 +5,7 @@
 //! obstacle, which is entered from either side, contacts keep a smaller distance instead, so that nothing goes through.
 
 use super::{CollisionScene, Overlap, OverlapPartner, Separation};
-use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
+use crate::mass_spring::{Contact, ContactQuery};
 use numerics::vector::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +36,11 @@ pub(super) struct Yielding {
 }
 
 impl Yielding {
+    /// By distances at the start and the end of a query of `seconds`.
+    pub(super) fn falling([start, end]: [f64; 2], seconds: f64) -> Self {
+        Self { by: end, speed: if seconds > 0.0 { (start - end) / seconds } else { 0.0 } }
+    }
+
     /// A contact that lets surfaces be closer by that, unless there is no room for it. Open obstacles must not be passed: there
     /// the distance to keep is smaller.
     pub(super) fn of(self, contact: Contact) -> Contact {
@@ -58,9 +63,7 @@ impl Separation<'_> {
             let [start, end] = self.grown;
             missing * (1.0 - over).max(0.0) + start + (end - start) * time
         };
-        let [start, end] = times.map(left);
-        let seconds = self.seconds * (times[1] - times[0]);
-        Yielding { by: end, speed: if seconds > 0.0 { (start - end) / seconds } else { 0.0 } }
+        Yielding::falling(times.map(left), self.seconds * (times[1] - times[0]))
     }
 }
 
@@ -82,46 +85,21 @@ impl CollisionScene<'_> {
 
     /// The pairs that are too close at the start of the frame, with contact points at `x`, apart from those of `overlaps`.
     pub fn too_close(&self, x: &[[f64; 3]], overlaps: &[Overlap]) -> Vec<Closeness> {
-        let mut skin_of = vec![usize::MAX; x.len()];
-        for (index, skin) in self.skins.iter().enumerate() {
-            skin.touching.iter().for_each(|point| skin_of[*point as usize] = index);
-        }
         let bare = CollisionScene { skins: self.skins, ..CollisionScene::default() };
-        let mut found: Vec<Closeness> = Vec::new();
-        let mut add = |scene: CollisionScene<'_>, of: Option<OverlapPartner>| {
-            let mut contacts = Vec::new();
-            scene.find(&ContactQuery { from: x, to: x, times: [0.0; 2] }, &mut contacts);
-            for contact in &contacts {
-                let side = |positive: bool| {
-                    let mut sides = contact.points.iter().zip(contact.weights);
-                    sides.find(|(_, weight)| *weight != 0.0 && (*weight > 0.0) == positive).map(|side| *side.0)
-                };
-                let of_point = |point: Option<u32>| point.map_or(usize::MAX, |point| skin_of[point as usize]);
-                let [first, second] = [of_point(side(true)), of_point(side(false))];
-                let (skin, partner) = match of {
-                    Some(partner) => (first, partner),
-                    None => (first.min(second), OverlapPartner::Skin(first.max(second))),
-                };
-                let missing = contact.depth(x);
-                if !missing.is_finite()
-                    || missing <= TOUCHING * contact.gap
-                    || overlaps.iter().any(|overlap| (overlap.skin, overlap.partner) == (skin, partner))
-                {
-                    continue;
-                }
-                let missing = missing.min(MOST * contact.gap);
-                match found.iter_mut().find(|close| (close.skin, close.partner) == (skin, partner)) {
-                    Some(close) => close.missing = close.missing.max(missing),
-                    None => found.push(Closeness { skin, partner, missing }),
-                }
-            }
-        };
-        add(CollisionScene { ground: self.ground, ..bare }, Some(OverlapPartner::Ground));
-        for (index, obstacle) in self.obstacles.iter().enumerate() {
-            let obstacles = std::slice::from_ref(obstacle);
-            add(CollisionScene { obstacles, ..bare }, Some(OverlapPartner::Obstacle(index)));
+        // Obstacles as if there were no ground, which they do not push below.
+        let (obstacles, body_contact) = (self.obstacles, self.body_contact);
+        let mut found = Vec::new();
+        for scene in [Self { ground: self.ground, ..bare }, Self { obstacles, body_contact, ..bare }] {
+            scene.each_pair(&ContactQuery { from: x, to: x, times: [0.0; 2] }, &mut |skin, partner, contacts| {
+                let overlapping =
+                    |partner| overlaps.iter().any(|overlap| (overlap.skin, overlap.partner) == (skin, partner));
+                let Some(partner) = partner.filter(|partner| !overlapping(*partner)) else { return };
+                let missing = contacts.iter().map(|contact| (contact.depth(x), contact.gap));
+                let missing = missing.filter(|(missing, gap)| missing.is_finite() && *missing > TOUCHING * gap);
+                let most = missing.map(|(missing, gap)| missing.min(MOST * gap)).reduce(f64::max);
+                found.extend(most.map(|missing| Closeness { skin, partner, missing }));
+            });
         }
-        add(CollisionScene { body_contact: self.body_contact, ..bare }, None);
         found
     }
 }

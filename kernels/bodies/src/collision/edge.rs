@@ -12,8 +12,8 @@ use numerics::vector::DVec3;
 /// Two edges that may be in contact.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Hit {
-    /// Parameters along the first and the second edge.
-    pub(super) shares: [f64; 2],
+    /// Weights of the ends of the first and the second edge.
+    pub(super) weights: [[f64; 2]; 2],
     /// Unit normal from the second to the first edge, at the end of the motion.
     pub(super) normal: DVec3,
 }
@@ -84,7 +84,7 @@ impl Pair<'_> {
                 let last = (d.cross(&e) * side).try_normalize(1e-12 * d.norm() * e.norm());
                 // The edges may have rotated past each other; then the normal at the crossing is kept.
                 let normal = last.filter(|last| last.dot(&normal) > 0.5).unwrap_or(normal);
-                return Some(Hit { shares: [s, u], normal });
+                return Some(Hit { weights: weights([s, u]), normal });
             }
         }
         None
@@ -106,7 +106,7 @@ impl Pair<'_> {
         }
         let last = between(self.segments(self.last()), shares);
         let turned = last.try_normalize(0.0).filter(|last| last.dot(&normal) > 0.0);
-        Some(Hit { shares, normal: turned.unwrap_or(normal) })
+        Some(Hit { weights: weights(shares), normal: turned.unwrap_or(normal) })
     }
 
     /// Whether the normal points out of the second surface at its edge, and into the first.
@@ -117,6 +117,11 @@ impl Pair<'_> {
         };
         is_ridge(1, normal) && is_ridge(0, -normal)
     }
+}
+
+/// Weights of the ends of two edges at parameters along them.
+fn weights(shares: [f64; 2]) -> [[f64; 2]; 2] {
+    shares.map(|share| [1.0 - share, share])
 }
 
 fn between([[p, q], [a, b]]: [[DVec3; 2]; 2], [s, u]: [f64; 2]) -> DVec3 {

@@ -26,7 +26,7 @@ mod solid;
 mod surface;
 mod vertex;
 
-use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
+use crate::mass_spring::{Contact, ContactFinder, ContactQuery, Weighted};
 pub use body_skin::BodySkin;
 use body_skin::{ReleasedElements, has};
 pub use caught::CaughtParticle;
@@ -85,6 +85,9 @@ pub enum CollisionError {
     Number(&'static str, f64),
 }
 
+/// What is done with the contacts of a skin and a partner.
+type ActOnPair<'a> = dyn FnMut(usize, Option<OverlapPartner>, Vec<Contact>) + 'a;
+
 /// Everything that may be in contact.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CollisionScene<'a> {
@@ -107,107 +110,100 @@ pub struct CollisionScene<'a> {
 }
 
 impl ContactFinder for CollisionScene<'_> {
-    /// The order is: ground contacts by particle; those of what is being pushed apart; those of each obstacle by
-    /// particle, then by its own points, then by edges; then pairs of bodies; then self-contacts. An obstacle that a body is
-    /// pushed out of keeps out the particles that are not in it, so that it can go on pressing.
     fn find(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
-        self.on_ground(query, out);
-        let pushed = self.separate(query, out);
-        let boxes = swept::swept_boxes(&[query.from, query.to]);
-        if !self.obstacles.is_empty() {
-            for (index, skin) in self.skins.iter().enumerate() {
-                let faces = skin.faces.sweep(&boxes, 0.0);
-                let released = skin.released(query.from);
-                for obstacle in 0..self.obstacles.len() {
-                    let pushed = pushed.get(&(index, obstacle));
-                    let released = match pushed {
-                        Some(particles) => ReleasedElements { particles: particles.clone(), ..Default::default() },
-                        None => skin.releasing(&released, self.caught_by(obstacle)),
-                    };
-                    self.against_obstacle(query, (index, &released), &boxes, obstacle, &mut |meeting, tree| {
-                        meeting.particles(tree, out);
-                        if pushed.is_none() {
-                            meeting.points(&faces, out);
-                            meeting.edges(out);
-                        }
-                    });
-                }
-            }
-        }
-        self.pairs(query, &boxes, out);
+        self.each_pair(query, &mut |_, _, contacts| out.extend(contacts));
     }
 
     fn least_steps(&self, query: &ContactQuery<'_>) -> u32 {
-        let mut least = 1;
-        for obstacle in self.obstacles {
-            let steps = (obstacle.motion.turn(query.times) / FARTHEST_TURN).ceil() as u32;
-            if steps <= least {
-                continue;
-            }
+        let steps = |obstacle: &Obstacle| (obstacle.motion.turn(query.times) / FARTHEST_TURN).ceil() as u32;
+        let is_near = |obstacle: &&Obstacle| {
             let poses = obstacle.motion.times(query.times, SAG * obstacle.thickness);
             let poses: Vec<Vec<[f64; 3]>> = poses.iter().map(|time| obstacle.at(*time)).collect();
             let passed = swept::swept_boxes(&poses.iter().map(Vec::as_slice).collect::<Vec<_>>());
             let passed = swept::bounds_of_finite(&obstacle.surface.vertices, &passed);
             let boxes = swept::swept_boxes(&[query.from, query.to]);
-            let is_near = |skin: &BodySkin| swept::overlap(&swept::bounds_of_finite(&skin.touching, &boxes), &passed);
-            if self.skins.iter().any(is_near) {
-                least = steps;
-            }
-        }
-        least
+            self.skins.iter().any(|skin| swept::overlap(&swept::bounds_of_finite(&skin.touching, &boxes), &passed))
+        };
+        let turning = self.obstacles.iter().filter(|obstacle| steps(obstacle) > 1);
+        turning.filter(is_near).map(steps).max().unwrap_or(1)
     }
 }
 
 impl CollisionScene<'_> {
-    fn on_ground(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) {
+    /// Calls `act` with the contacts of each skin, by index, with each partner; `None`: with itself.
+    ///
+    /// The order is: ground contacts by particle; those of what is being pushed apart; those of each obstacle by
+    /// particle, then by its own points, then by edges; then pairs of bodies; then self-contacts. An obstacle that a body is
+    /// pushed out of keeps out the particles that are not in it, so that it can go on pressing.
+    fn each_pair(&self, query: &ContactQuery<'_>, act: &mut ActOnPair<'_>) {
+        self.on_ground(query, act);
+        let pushed = self.separate(query, act);
+        let boxes = swept::swept_boxes(&[query.from, query.to]);
+        if !self.obstacles.is_empty() {
+            for (index, skin) in self.skins.iter().enumerate() {
+                let faces = skin.surface.swept.sweep(&boxes, 0.0);
+                let released = skin.released(query.from);
+                for obstacle in 0..self.obstacles.len() {
+                    let pushed = pushed.get(&(index, obstacle));
+                    let usual = || skin.releasing(&released, self.caught_by(obstacle));
+                    let released = pushed.cloned().unwrap_or_else(usual);
+                    self.against_obstacle(query, index, &boxes, obstacle, &mut |meeting, tree| {
+                        let mut contacts = Vec::new();
+                        meeting.particles(tree, &released, &mut contacts);
+                        if pushed.is_none() {
+                            meeting.points(&faces, &released, &mut contacts);
+                            meeting.edges(&released, &mut contacts);
+                        }
+                        act(index, Some(OverlapPartner::Obstacle(obstacle)), contacts);
+                    });
+                }
+            }
+        }
+        self.pairs(query, &boxes, act);
+    }
+
+    fn on_ground(&self, query: &ContactQuery<'_>, act: &mut ActOnPair<'_>) {
         let Some(ground) = self.ground else { return };
         let up = DVec3::from(ground.up);
         for (index, skin) in self.skins.iter().enumerate() {
             let rising = self.separating(index, OverlapPartner::Ground);
             let yielding = self.yielding(index, Some(OverlapPartner::Ground), query.times);
-            for particle in &skin.touching {
+            let contact = |particle: &u32| {
                 let height = |x: &[[f64; 3]]| up.dot(&DVec3::from(x[*particle as usize])) - ground.height;
                 let before = height(query.from);
                 if before.min(height(query.to)) > REACH * ground.thickness {
-                    continue;
+                    return None;
                 }
                 let depth = (ground.thickness - before).max(0.0);
-                let (allowed, speed) = rising.map_or((0.0, 0.0), |overlap| self.allowed(overlap, depth, query.times));
-                let contact = yielding.of(Contact {
-                    points: [*particle, 0, 0, 0],
-                    weights: [1.0, 0.0, 0.0, 0.0],
-                    normal: ground.up,
-                    offset: ground.height - allowed,
-                    gap: ground.thickness,
-                    velocity: (up * speed).into(),
-                    friction: ground.friction * self.friction_scale(&[*particle], &[1.0]),
-                    jammed: false,
-                    open: false,
-                });
+                let rising = rising.map_or(Yielding::default(), |overlap| self.allowed(overlap, depth, query.times));
+                let contact = Contact::between([(&[*particle], &[1.0]), (&[], &[])], up, ground.thickness);
+                let friction = ground.friction * self.friction_scale(&contact);
+                let contact = yielding.of(rising.of(Contact { offset: ground.height, friction, ..contact }));
                 // Contacts yield as they do with what has an inside.
-                out.push(Contact { open: true, ..contact });
-            }
+                Some(Contact { open: true, ..contact })
+            };
+            act(index, Some(OverlapPartner::Ground), skin.touching.iter().filter_map(contact).collect());
         }
     }
 
-    /// Factor on friction at the point with these weights.
-    fn friction_scale(&self, points: &[u32], weights: &[f64]) -> f64 {
+    /// Factor on the friction of a contact.
+    fn friction_scale(&self, contact: &Contact) -> f64 {
         let Some(mask) = self.friction else { return 1.0 };
         let of = |point: &u32| mask.get(*point as usize).map_or(1.0, |scale| f64::from(*scale));
         let (mut sum, mut whole) = (0.0, 0.0);
-        for (point, weight) in points.iter().zip(weights).filter(|side| *side.1 != 0.0) {
+        for (point, weight) in contact.points.iter().zip(contact.weights).filter(|side| side.1 != 0.0) {
             sum += of(point) * weight.abs();
             whole += weight.abs();
         }
         if whole > 0.0 { sum / whole } else { 1.0 }
     }
 
-    /// Calls `act` with a skin, by index, without its released elements, and an obstacle, unless they stay apart, and with the
-    /// swept boxes of the obstacle's triangles. `boxes` are those of the particles.
+    /// Calls `act` with a skin and an obstacle, by index, unless they stay apart, and with the swept boxes of the obstacle's
+    /// triangles. `boxes` are those of the particles.
     fn against_obstacle(
         &self,
         query: &ContactQuery<'_>,
-        (skin_index, released): (usize, &ReleasedElements),
+        skin_index: usize,
         boxes: &[Cuboid],
         index: usize,
         act: &mut dyn FnMut(&SkinObstaclePair<'_>, &SweptBoxTree<'_>),
@@ -218,7 +214,7 @@ impl CollisionScene<'_> {
         let obstacle_poses: Vec<Vec<[f64; 3]>> = times.iter().map(|time| obstacle.at(*time)).collect();
         let obstacle_poses: Vec<Positions<'_>> = obstacle_poses.iter().map(Vec::as_slice).collect();
         let still_boxes = swept::swept_boxes(&obstacle_poses);
-        let tree = obstacle.faces.sweep(&still_boxes, rules.reach);
+        let tree = obstacle.surface.swept.sweep(&still_boxes, rules.reach);
         let caught = self.caught_by(index);
         if caught.is_empty() && !swept::overlap(&swept::bounds_of_finite(&skin.touching, boxes), &tree.bounds) {
             return;
@@ -231,7 +227,6 @@ impl CollisionScene<'_> {
             scene: self,
             query,
             skin,
-            released,
             obstacle,
             caught,
             boxes: [boxes, &still_boxes],
@@ -249,9 +244,8 @@ fn poses_between(query: &ContactQuery<'_>, times: &[f64]) -> Vec<Vec<[f64; 3]>> 
     let whole = query.times[1] - query.times[0];
     let at = |time: &f64| {
         let share = if whole > 0.0 { (time - query.times[0]) / whole } else { 1.0 };
-        let mut pose = vec![[0.0; 3]; query.from.len()];
-        parallel::fill(&mut pose, POINTS, |n| DVec3::from(query.from[n]).lerp(&DVec3::from(query.to[n]), share).into());
-        pose
+        let point = |n: usize| DVec3::from(query.from[n]).lerp(&DVec3::from(query.to[n]), share).into();
+        parallel::tabulate(query.from.len(), POINTS, point)
     };
     times[1..times.len() - 1].iter().map(at).collect()
 }
@@ -261,7 +255,6 @@ struct SkinObstaclePair<'a> {
     scene: &'a CollisionScene<'a>,
     query: &'a ContactQuery<'a>,
     skin: &'a BodySkin,
-    released: &'a ReleasedElements,
     obstacle: &'a Obstacle,
     caught: &'a [CaughtParticle],
     /// Swept boxes of the particles and of the obstacle's points.
@@ -272,68 +265,59 @@ struct SkinObstaclePair<'a> {
     yielding: Yielding,
 }
 
-/// Adds the contacts of some things to a list, with buffers that another task may have used before.
-type FindIn<'a, S> = dyn Fn(&mut S, &[u32], &mut Vec<Contact>) + Sync + 'a;
+/// What an element may meet, and marks on points: buffers, which another task may have used before.
+type Buffers = (Vec<u32>, Vec<u32>);
 
-/// Collects the contacts of `things` in their order, for any number of threads.
-fn collect_in_order<S: Default + Send>(things: &[u32], find_in: &FindIn<'_, S>, out: &mut Vec<Contact>) {
-    let unused: Mutex<Vec<S>> = Mutex::default();
+/// Collects the contacts that `find` adds for each of `things` in their order, for any number of threads.
+fn collect_in_order(
+    things: &[u32],
+    out: &mut Vec<Contact>,
+    find: impl Fn(u32, &mut Buffers, &mut Vec<Contact>) + Sync,
+) {
+    let unused: Mutex<Vec<Buffers>> = Mutex::default();
     let lock = || unused.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let parts = parallel::map(things.chunks(TASK), |_, things| {
-        let (mut scratch, mut seen) = (lock().pop().unwrap_or_default(), Vec::new());
-        find_in(&mut scratch, things, &mut seen);
-        lock().push(scratch);
+        let (mut buffers, mut seen) = (lock().pop().unwrap_or_default(), Vec::new());
+        things.iter().for_each(|thing| find(*thing, &mut buffers, &mut seen));
+        lock().push(buffers);
         seen
     });
     out.extend(parts.into_iter().flatten());
 }
 
-/// Positions of a point in all poses.
-fn path_of(poses: &[Positions<'_>], point: u32, path: &mut Vec<DVec3>) {
-    path.clear();
-    path.extend(poses.iter().map(|pose| DVec3::from(pose[point as usize])));
-}
-
 impl SkinObstaclePair<'_> {
     /// Particles of the skin against triangles of the obstacle.
-    fn particles(&self, tree: &SweptBoxTree<'_>, out: &mut Vec<Contact>) {
+    fn particles(&self, tree: &SweptBoxTree<'_>, released: &ReleasedElements, out: &mut Vec<Contact>) {
         let bounds = tree.bounds;
         // Made before the loop: a thread of the pool that waits for another's tree could wait forever.
-        let solid = self.solid_at_start(&bounds);
-        let find_in = |(): &mut (), particles: &[u32], out: &mut Vec<Contact>| {
-            let (mut faces, mut path) = (Vec::new(), Vec::new());
-            for particle in particles.iter().filter(|particle| !has(&self.released.particles, **particle)) {
-                tree.overlapping(&self.boxes[0][*particle as usize], &mut faces);
-                let own = &self.boxes[0][*particle as usize];
-                let entry = self.entry(*particle);
-                if faces.is_empty() && entry.is_none() && !(solid.is_some() && swept::overlap(own, &bounds)) {
-                    continue;
-                }
-                path_of(self.body.poses, *particle, &mut path);
-                let start = path[0];
-                let closest_at_start = || self.closest_at_start(solid.as_ref()?, &bounds, start);
-                for hit in vertex::hits(&path, &self.still, (&faces, entry), &closest_at_start, &self.rules) {
-                    let corners = self.obstacle.surface.triangles[hit.face as usize];
-                    let first = ([*particle, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]);
-                    out.push(self.contact(first, (&corners, &hit.weights), hit.normal, hit.shift));
-                }
+        let solid = self.solid_at_start(released, &bounds);
+        collect_in_order(&self.skin.touching, out, |particle, (faces, _), out| {
+            if has(&released.particles, particle) {
+                return;
             }
-        };
-        collect_in_order(&self.skin.touching, &find_in, out);
+            let (own, entry) = (&self.boxes[0][particle as usize], self.entry(particle));
+            tree.overlapping(own, faces);
+            if faces.is_empty() && entry.is_none() && !(solid.is_some() && swept::overlap(own, &bounds)) {
+                return;
+            }
+            let path = self.body.path(particle);
+            let closest_at_start = || self.closest_at_start(solid.as_ref()?, &bounds, path[0]);
+            for hit in vertex::hits(&path, &self.still, (faces, entry), &closest_at_start, &self.rules) {
+                let corners = &self.obstacle.surface.triangles[hit.face as usize];
+                let sides = [(&[particle][..], &[1.0][..]), (corners, &hit.weights)];
+                out.push(self.contact(sides, hit.normal, hit.shift));
+            }
+        });
     }
 
     /// The obstacle's triangles at the start of the motion, where it has an inside and a particle may be in it: within
     /// its `bounds`.
-    fn solid_at_start(&self, bounds: &Cuboid) -> Option<TriangleTree> {
+    fn solid_at_start(&self, released: &ReleasedElements, bounds: &Cuboid) -> Option<TriangleTree> {
         let may_be_inside = |particle: &u32| {
-            !has(&self.released.particles, *particle) && swept::overlap(&self.boxes[0][*particle as usize], bounds)
+            !has(&released.particles, *particle) && swept::overlap(&self.boxes[0][*particle as usize], bounds)
         };
-        if !self.obstacle.surface.closed || !self.skin.touching.iter().any(may_be_inside) {
-            return None;
-        }
-        let mut tree = self.obstacle.solid.clone();
-        tree.refit(&obstacle::narrow(self.still.poses[0]));
-        Some(tree)
+        let needed = self.obstacle.surface.closed && self.skin.touching.iter().any(may_be_inside);
+        needed.then(|| self.obstacle.solid.moved(&obstacle::narrow(self.still.poses[0])))
     }
 
     /// The triangle of `solid` closest to the `start` of a motion, for a particle within the `bounds` of the obstacle.
@@ -347,73 +331,57 @@ impl SkinObstaclePair<'_> {
     }
 
     /// Sharp points of the obstacle against triangles of the skin.
-    fn points(&self, tree: &SweptBoxTree<'_>, out: &mut Vec<Contact>) {
-        let find_in = |(): &mut (), points: &[u32], out: &mut Vec<Contact>| {
-            let (mut faces, mut path) = (Vec::new(), Vec::new());
-            for point in points {
-                let region = swept::inflated(&self.boxes[1][*point as usize], self.rules.reach);
-                tree.overlapping(&region, &mut faces);
-                faces.retain(|face| !has(&self.released.faces, *face));
-                if faces.is_empty() {
-                    continue;
-                }
-                path_of(self.still.poses, *point, &mut path);
-                for hit in vertex::hits(&path, &self.body, (&faces, None), &|| None, &self.rules) {
-                    let [a, b, c] = self.skin.surface.triangles[hit.face as usize];
-                    let [u, v, w] = hit.weights;
-                    let first = ([a, b, c, 0], [u, v, w, 0.0]);
-                    out.push(self.contact(first, (&[*point], &[1.0]), -hit.normal, hit.shift));
-                }
+    fn points(&self, tree: &SweptBoxTree<'_>, released: &ReleasedElements, out: &mut Vec<Contact>) {
+        collect_in_order(&self.obstacle.sharp_points, out, |point, (faces, _), out| {
+            tree.overlapping(&swept::inflated(&self.boxes[1][point as usize], self.rules.reach), faces);
+            faces.retain(|face| !has(&released.faces, *face));
+            if faces.is_empty() {
+                return;
             }
-        };
-        collect_in_order(&self.obstacle.sharp_points, &find_in, out);
+            let path = self.still.path(point);
+            for hit in vertex::hits(&path, &self.body, (faces, None), &|| None, &self.rules) {
+                let corners = &self.skin.surface.triangles[hit.face as usize];
+                let sides = [(&corners[..], &hit.weights[..]), (&[point], &[1.0])];
+                out.push(self.contact(sides, -hit.normal, hit.shift));
+            }
+        });
     }
 
     /// Edges of the skin against sharp edges of the obstacle.
-    fn edges(&self, out: &mut Vec<Contact>) {
+    fn edges(&self, released: &ReleasedElements, out: &mut Vec<Contact>) {
         let tree = self.obstacle.edges.sweep(self.boxes[1], self.rules.reach);
         let indices: Vec<u32> = (0..self.skin.surface.edges.len() as u32).collect();
-        let find_in = |(): &mut (), edges: &[u32], out: &mut Vec<Contact>| {
-            let mut others = Vec::new();
-            for index in edges.iter().filter(|edge| !has(&self.released.edges, **edge)) {
-                let edge = &self.skin.surface.edges[*index as usize];
-                tree.overlapping(&swept::bounds_of(&edge.ends, self.boxes[0]), &mut others);
-                for other in &others {
-                    let other = &self.obstacle.surface.edges[self.obstacle.sharp_edges[*other as usize] as usize];
-                    if let Some(hit) = edge::hit([&self.body, &self.still], [edge, other], &self.rules) {
-                        let [s, t] = hit.shares;
-                        let first = ([edge.ends[0], edge.ends[1], 0, 0], [1.0 - s, s, 0.0, 0.0]);
-                        out.push(self.contact(first, (&other.ends, &[1.0 - t, t]), hit.normal, 0.0));
-                    }
+        collect_in_order(&indices, out, |index, (others, _), out| {
+            if has(&released.edges, index) {
+                return;
+            }
+            let edge = &self.skin.surface.edges[index as usize];
+            tree.overlapping(&swept::bounds_of(&edge.ends, self.boxes[0]), others);
+            for other in others {
+                let other = &self.obstacle.surface.edges[self.obstacle.sharp_edges[*other as usize] as usize];
+                if let Some(hit) = edge::hit([&self.body, &self.still], [edge, other], &self.rules) {
+                    let sides = [(&edge.ends[..], &hit.weights[0][..]), (&other.ends, &hit.weights[1])];
+                    out.push(self.contact(sides, hit.normal, 0.0));
                 }
             }
-        };
-        collect_in_order(&indices, &find_in, out);
+        });
     }
 
     /// A contact of points of the body with points of the obstacle, which counts as stopped above the ground.
-    fn contact(
-        &self,
-        (own, weights): ([u32; 4], [f64; 4]),
-        (points, shares): (&[u32], &[f64]),
-        normal: DVec3,
-        shift: f64,
-    ) -> Contact {
+    fn contact(&self, [own, (points, shares)]: [Weighted<'_>; 2], normal: DVec3, shift: f64) -> Contact {
         let (gap, times) = (self.rules.gap, self.query.times);
         let touched = [self.still.start(), self.still.end()].map(|at| at.weighted(points, shares));
         let [raised, raised_end] = touched.map(|touched| self.scene.raised(touched, normal, gap));
         let seconds = self.obstacle.seconds * (times[1] - times[0]);
         let stopping = if seconds > 0.0 { (raised_end - raised) / seconds } else { DVec3::zeros() };
+        let contact = Contact::between([own, (&[], &[])], normal, gap);
         self.yielding.of(Contact {
-            points: own,
-            weights,
-            normal: normal.into(),
             offset: normal.dot(&(touched[1] + raised_end)) - shift,
-            gap,
             velocity: (self.obstacle.velocity_of(times[1], points, shares) + stopping).into(),
-            friction: self.obstacle.friction * self.scene.friction_scale(&own, &weights),
+            friction: self.obstacle.friction * self.scene.friction_scale(&contact),
             jammed: -normal.dot(&raised_end) > JAMMED * gap,
             open: !self.obstacle.surface.closed,
+            ..contact
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::CollisionError;
 use super::motion::{Motion, ObstaclePose};
-use super::surface::{Moment, NONE, TriangleSurface};
+use super::surface::{Moment, TriangleSurface};
 use numerics::swept::SweptElements;
 use numerics::tree::TriangleTree;
 use numerics::vector::{DVec3, Vec3};
@@ -12,8 +12,7 @@ use numerics::vector::{DVec3, Vec3};
 pub struct Obstacle {
     pub(super) surface: TriangleSurface,
     pub(super) motion: Motion,
-    /// Swept boxes of triangles and of sharp edges, and the indices of those edges.
-    pub(super) faces: SweptElements<3>,
+    /// Sharp edges, for swept boxes, and their indices.
     pub(super) edges: SweptElements<2>,
     pub(super) sharp_edges: Vec<u32>,
     /// Points where the surface is not flat.
@@ -57,8 +56,8 @@ impl Obstacle {
                 return Err(CollisionError::Number(what, value));
             }
         }
-        let surface = TriangleSurface::new(points, triangles);
         let first = &poses[0].positions[..];
+        let surface = TriangleSurface::new(first, triangles);
         let flat = |index: u32| poses.iter().all(|pose| is_flat(&surface, &Moment::of(&pose.positions), index));
         let sharp_edges: Vec<u32> = (0..surface.edges.len() as u32).filter(|index| !flat(*index)).collect();
         let mut sharp_points: Vec<u32> =
@@ -67,7 +66,6 @@ impl Obstacle {
         sharp_points.dedup();
         let ends = sharp_edges.iter().map(|index| surface.edges[*index as usize].ends).collect();
         Ok(Self {
-            faces: SweptElements::new(surface.triangles.clone(), first),
             edges: SweptElements::new(ends, first),
             solid: TriangleTree::build(&narrow(first), &surface.triangles),
             motion: Motion::new(poses),
@@ -78,11 +76,6 @@ impl Obstacle {
             thickness,
             friction,
         })
-    }
-
-    /// Whether it has an inside: every edge has two consistently oriented triangles.
-    pub fn is_closed(&self) -> bool {
-        self.surface.closed
     }
 
     /// Positions of its points at a time in the frame, metres: exact at poses, between them by the best-fitting rigid
@@ -145,11 +138,7 @@ fn is_flat(surface: &TriangleSurface, at: &Moment<'_>, edge: u32) -> bool {
     /// 1 − cosine of the angle between them: 5e-5 radians, above the rounding of f32 meshes and below any intended
     /// angle.
     const BEND: f64 = 1e-9;
-    let faces = surface.edges[edge as usize].faces;
-    if faces.contains(&NONE) {
-        return false;
-    }
-    match faces.map(|face| surface.normal(at, face)) {
+    match surface.edges[edge as usize].faces.map(|face| surface.normal(at, face)) {
         [Some(a), Some(b)] => a.dot(&b) > 1.0 - BEND,
         _ => false,
     }

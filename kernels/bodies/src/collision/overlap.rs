@@ -12,15 +12,13 @@
 //! Limit: bodies of which only edges cross, with no point of one inside the other, are not pushed apart;
 //! [`CollisionScene::crossings`] finds them.
 
-use super::obstacle::narrow;
 use super::solid::Solid;
 use super::surface::{Moment, TriangleSurface};
-use super::{BodySkin, Closeness, CollisionScene, Obstacle};
-use crate::mass_spring::{Contact, ContactFinder, ContactQuery};
+use super::{ActOnPair, Closeness, CollisionScene, ReleasedElements, Yielding};
+use crate::mass_spring::{Contact, ContactFinder, ContactQuery, Weighted};
 use crate::tets::{Enclosure, Exit};
 use numerics::closest_point::ClosestPoint;
 use numerics::swept;
-use numerics::tree::TriangleTree;
 use numerics::vector::DVec3;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -74,8 +72,8 @@ pub struct Separation<'a> {
     pub seconds: f64,
 }
 
-/// Which particles are being pushed out of obstacles, by the indices of their skin and of the obstacle.
-type Pushed = BTreeMap<(usize, usize), Vec<bool>>;
+/// What obstacles release as it is being pushed out of them, by the indices of the skin and of the obstacle.
+type Pushed = BTreeMap<(usize, usize), ReleasedElements>;
 
 /// Where bodies are, relative to what should keep them out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -86,49 +84,46 @@ pub struct Penetration {
     pub deepest: f64,
 }
 
-/// One side of an overlap: the points that may be inside the other, and its surface.
+/// One side of an overlap.
 struct Side<'a> {
-    points: &'a [[f64; 3]],
-    candidates: &'a [u32],
-    surface: &'a TriangleSurface,
-    /// The points, with those of the surface moved below it.
+    of: &'a Solid<'a>,
+    /// Its points, with those of the surface moved below it.
     below: Vec<[f64; 3]>,
-    solid: Enclosure,
+    enclosure: Enclosure,
 }
 
 impl<'a> Side<'a> {
     /// `touching` is the depth from which points count as inside.
-    fn new(
-        points: &'a [[f64; 3]],
-        candidates: &'a [u32],
-        surface: &'a TriangleSurface,
-        [gap, touching]: [f64; 2],
-    ) -> Self {
-        let below = below(points, surface, BELOW * gap);
-        Self { points, candidates, surface, below, solid: Enclosure::new(points, &surface.triangles, touching) }
+    fn new(of: &'a Solid<'a>, [gap, touching]: [f64; 2]) -> Self {
+        let below = below(&of.points, of.surface, BELOW * gap);
+        Self { of, below, enclosure: Enclosure::new(&of.points, &of.surface.triangles, touching) }
     }
 
     /// Which of its points are inside the other.
     fn within(&self, other: &Self) -> Vec<bool> {
-        let mut inside = vec![false; self.points.len()];
-        if other.surface.closed {
-            other.solid.mark(self.points, self.candidates, &mut inside);
-            other.solid.mark(&self.below, self.candidates, &mut inside);
+        let mut inside = vec![false; self.of.points.len()];
+        if other.of.surface.closed {
+            other.enclosure.mark(&self.of.points, self.of.candidates, &mut inside);
+            other.enclosure.mark(&self.below, self.of.candidates, &mut inside);
         }
         inside
     }
 
+    /// How far a point was moved along a direction to be below the surface.
+    fn lowered(&self, point: usize, direction: DVec3) -> f64 {
+        direction.dot(&(DVec3::from(self.below[point]) - DVec3::from(self.of.points[point])))
+    }
+
     /// Where those of its points that are inside the other, or a little below the surface are, leave it in a direction.
     fn exits(&self, other: &Self, candidates: &[u32], direction: DVec3) -> Vec<Exit> {
-        let mut exits = other.solid.exits(&self.below, candidates, direction);
+        let mut exits = other.enclosure.exits(&self.below, candidates, direction);
         for exit in &mut exits {
-            let [below, point] = [&self.below, self.points].map(|all| DVec3::from(all[exit.point as usize]));
-            exit.distance = (exit.distance + direction.dot(&(below - point))).max(0.0);
+            exit.distance = (exit.distance + self.lowered(exit.point as usize, direction)).max(0.0);
         }
         // Those that are inside by less than that.
         let is_known = |point: &u32| exits.binary_search_by_key(point, |exit| exit.point).is_ok();
         let others: Vec<u32> = candidates.iter().copied().filter(|point| !is_known(point)).collect();
-        exits.extend(other.solid.exits(self.points, &others, direction));
+        exits.extend(other.enclosure.exits(&self.of.points, &others, direction));
         exits.sort_by_key(|exit| exit.point);
         exits
     }
@@ -136,16 +131,16 @@ impl<'a> Side<'a> {
     /// How far it has to go in a direction until no line through a point of its surface, as far as it is inside, is in
     /// the other: what is beyond a thin part of the other has to pass it, too.
     fn way_out(&self, other: &Self, direction: DVec3, gap: f64) -> f64 {
-        if !(self.surface.closed && other.surface.closed) {
+        if !(self.of.surface.closed && other.of.surface.closed) {
             return 0.0;
         }
-        let vertices = &self.surface.vertices;
-        let mut own = vec![0.0; self.points.len()];
-        for exit in self.solid.exits(&self.below, vertices, direction) {
+        let vertices = &self.of.surface.vertices;
+        let mut own = vec![0.0; self.of.points.len()];
+        for exit in self.enclosure.exits(&self.below, vertices, direction) {
             own[exit.point as usize] = exit.distance;
         }
         let mut way = 0.0_f64;
-        other.solid.stretches(&self.below, vertices, direction, |point, stretches| {
+        other.enclosure.stretches(&self.below, vertices, direction, |point, stretches| {
             let point = point as usize;
             let (mut left, own) = (0.0_f64, own[point] - BELOW * gap);
             for [enters, leaves] in stretches {
@@ -154,8 +149,7 @@ impl<'a> Side<'a> {
                 }
             }
             if left > 0.0 {
-                let [below, point] = [&self.below, self.points].map(|all| DVec3::from(all[point]));
-                way = way.max(left + direction.dot(&(below - point)));
+                way = way.max(left + self.lowered(point, direction));
             }
         });
         way
@@ -163,17 +157,17 @@ impl<'a> Side<'a> {
 
     /// The triangle by which a point of another side leaves it, and the barycentric weights of where.
     fn place(&self, other: &Self, exit: &Exit, direction: DVec3) -> ([u32; 3], [f64; 3]) {
-        let passed = DVec3::from(other.points[exit.point as usize]) + direction * exit.distance;
-        let corners = self.surface.corners(&Moment::of(self.points), exit.face);
-        (self.surface.triangles[exit.face as usize], ClosestPoint::on(exit.face, passed, corners).weights)
+        let passed = DVec3::from(other.of.points[exit.point as usize]) + direction * exit.distance;
+        let corners = self.of.surface.corners(&Moment::of(&self.of.points), exit.face);
+        (self.of.surface.triangles[exit.face as usize], ClosestPoint::on(exit.face, passed, corners).weights)
     }
 
     /// Sum of the area vectors of its triangles that are inside, given which of its points are.
     fn area_within(&self, inside: &[bool]) -> DVec3 {
-        let at = Moment::of(self.points);
-        let faces = self.surface.triangles.iter().zip(0..);
+        let at = Moment::of(&self.of.points);
+        let faces = self.of.surface.triangles.iter().zip(0..);
         let faces = faces.filter(|(corners, _)| corners.iter().all(|corner| inside[*corner as usize]));
-        faces.map(|(_, face)| self.surface.corners(&at, face)).map(|[a, b, c]| (b - a).cross(&(c - a))).sum()
+        faces.map(|(_, face)| self.of.surface.corners(&at, face)).map(|[a, b, c]| (b - a).cross(&(c - a))).sum()
     }
 }
 
@@ -192,7 +186,7 @@ impl CollisionScene<'_> {
                 if !(is_skin || other.surface.closed) {
                     continue;
                 }
-                let sides = [own, other].map(|of| Side::new(&of.points, of.candidates, of.surface, [other.gap; 2]));
+                let sides = [own, other].map(|of| Side::new(of, [other.gap; 2]));
                 let room = if is_skin { None } else { self.room(own, x) };
                 let marked = add_overlap((skin, other), [&sides[0], &sides[1]], room, &mut found);
                 for marked in &marked[..1 + usize::from(is_skin)] {
@@ -236,93 +230,62 @@ impl CollisionScene<'_> {
         self.separated().iter().find(|overlap| overlap.skin == skin && overlap.partner == partner)
     }
 
-    /// The depth below its gap that a point may have at the end of the query, if it has `depth` at its start, and the
-    /// speed at which it falls, m/s.
-    pub(super) fn allowed(&self, overlap: &Overlap, depth: f64, times: [f64; 2]) -> (f64, f64) {
-        let Some(separation) = self.separation else { return (0.0, 0.0) };
+    /// How contacts yield at the end of the query for a point that has this `depth` below its gap at the start.
+    pub(super) fn allowed(&self, overlap: &Overlap, depth: f64, times: [f64; 2]) -> Yielding {
+        let Some(separation) = self.separation else { return Yielding::default() };
         let (whole, passed) = (f64::from(separation.frames), times[1] - times[0]);
         let left = whole - f64::from(separation.over) - times[0];
         let even = depth - overlap.depth * passed / whole;
         let allowed = even.min(depth * (1.0 - passed / left)).max(0.0);
-        let seconds = separation.seconds * passed;
-        (allowed, if seconds > 0.0 { (depth - allowed) / seconds } else { 0.0 })
+        Yielding::falling([depth, allowed], separation.seconds * passed)
     }
 
-    /// Contacts of the pairs that are being pushed apart; returns what is pushed out of obstacles.
-    pub(super) fn separate(&self, query: &ContactQuery<'_>, out: &mut Vec<Contact>) -> Pushed {
+    /// Contacts without friction of the pairs that are being pushed apart; returns what is pushed out of obstacles.
+    pub(super) fn separate(&self, query: &ContactQuery<'_>, act: &mut ActOnPair<'_>) -> Pushed {
         let mut pushed = Pushed::new();
+        if self.separated().is_empty() {
+            return pushed;
+        }
+        let boxes = swept::swept_boxes(&[query.from]);
+        let [skins, obstacles] = self.solids(query.from, &boxes, query.times[0]);
         for overlap in self.separated() {
-            match overlap.partner {
-                OverlapPartner::Ground => {}
-                OverlapPartner::Obstacle(obstacle) => {
-                    let particles = self.out_of_obstacle(query, overlap, &self.obstacles[obstacle], out);
-                    pushed.insert((overlap.skin, obstacle), particles);
+            let (other, obstacle) = match overlap.partner {
+                OverlapPartner::Obstacle(index) => (&obstacles[index], Some(&self.obstacles[index])),
+                OverlapPartner::Skin(index) if self.body_contact.is_some() => (&skins[index], None),
+                OverlapPartner::Ground | OverlapPartner::Skin(_) => continue,
+            };
+            let (gap, direction) = (other.gap, DVec3::from(overlap.direction));
+            let end = obstacle.map(|obstacle| obstacle.at(query.times[1]));
+            let [first, other] = [&skins[overlap.skin], other].map(|of| Side::new(of, [gap, 0.0]));
+            let (mut contacts, mut particles) = (Vec::new(), vec![false; query.from.len()]);
+            for (own, [inner, outer], normal) in
+                [(true, [&first, &other], direction), (false, [&other, &first], -direction)]
+            {
+                for exit in inner.exits(outer, inner.of.candidates, normal) {
+                    let (corners, shares) = outer.place(inner, &exit, normal);
+                    let sides: [Weighted<'_>; 2] = [(&[exit.point], &[1.0]), (&corners, &shares)];
+                    let contact = match obstacle.zip(end.as_ref()) {
+                        None => Contact::between(sides, normal, gap),
+                        Some((obstacle, end)) => {
+                            let [body, (points, shares)] = if own { sides } else { [sides[1], sides[0]] };
+                            Contact {
+                                offset: direction.dot(&Moment::of(end).weighted(points, shares)),
+                                velocity: obstacle.velocity_of(query.times[1], points, shares).into(),
+                                ..Contact::between([body, (&[], &[])], direction, gap)
+                            }
+                        }
+                    };
+                    contacts.push(self.allowed(overlap, exit.distance + gap, query.times).of(contact));
+                    if own {
+                        particles[exit.point as usize] = true;
+                    }
                 }
-                OverlapPartner::Skin(index) => self.out_of_skin(query, overlap, &self.skins[index], out),
+            }
+            act(overlap.skin, Some(overlap.partner), contacts);
+            if let OverlapPartner::Obstacle(index) = overlap.partner {
+                pushed.insert((overlap.skin, index), ReleasedElements { particles, ..Default::default() });
             }
         }
-        pushed
-    }
-
-    /// The contact of points with these weights, without friction, that allows the depth of an `exit` from what is at rest
-    /// at the origin, and pushes along `normal`.
-    fn pushing(
-        &self,
-        (query, overlap, gap): (&ContactQuery<'_>, &Overlap, f64),
-        exit: &Exit,
-        (points, weights): ([u32; 4], [f64; 4]),
-        normal: DVec3,
-    ) -> Contact {
-        let (allowed, speed) = self.allowed(overlap, exit.distance + gap, query.times);
-        let (velocity, normal) = ((normal * speed).into(), normal.into());
-        Contact { points, weights, normal, offset: -allowed, gap, velocity, friction: 0.0, jammed: false, open: false }
-    }
-
-    fn out_of_skin(&self, query: &ContactQuery<'_>, overlap: &Overlap, other: &BodySkin, out: &mut Vec<Contact>) {
-        let Some(params) = self.body_contact else { return };
-        let direction = DVec3::from(overlap.direction);
-        let [first, other] = [&self.skins[overlap.skin], other]
-            .map(|skin| Side::new(query.from, &skin.touching, &skin.surface, [params.thickness, 0.0]));
-        for ([inner, outer], normal) in [([&first, &other], direction), ([&other, &first], -direction)] {
-            for exit in inner.exits(outer, inner.candidates, normal) {
-                let ([a, b, c], [u, v, w]) = outer.place(inner, &exit, normal);
-                let sides = ([exit.point, a, b, c], [1.0, -u, -v, -w]);
-                out.push(self.pushing((query, overlap, params.thickness), &exit, sides, normal));
-            }
-        }
-    }
-
-    /// Returns which particles are pushed.
-    fn out_of_obstacle(
-        &self,
-        query: &ContactQuery<'_>,
-        overlap: &Overlap,
-        other: &Obstacle,
-        out: &mut Vec<Contact>,
-    ) -> Vec<bool> {
-        let first = &self.skins[overlap.skin];
-        let normal = DVec3::from(overlap.direction);
-        let [start, end] = query.times.map(|time| other.at(time));
-        let mut push = |exit: &Exit, own: ([u32; 4], [f64; 4]), points: &[u32], shares: &[f64]| {
-            let contact = self.pushing((query, overlap, other.thickness), exit, own, normal);
-            let reached = Moment::of(&end).weighted(points, shares);
-            let velocity = other.velocity_of(query.times[1], points, shares) + DVec3::from(contact.velocity);
-            out.push(Contact { offset: normal.dot(&reached) + contact.offset, velocity: velocity.into(), ..contact });
-        };
-        let gaps = [other.thickness, 0.0];
-        let body = Side::new(query.from, &first.touching, &first.surface, gaps);
-        let solid = Side::new(&start, &other.surface.vertices, &other.surface, gaps);
-        let exits = body.exits(&solid, body.candidates, normal);
-        for exit in &exits {
-            let (corners, shares) = solid.place(&body, exit, normal);
-            push(exit, ([exit.point, 0, 0, 0], [1.0, 0.0, 0.0, 0.0]), &corners, &shares);
-        }
-        for exit in solid.exits(&body, solid.candidates, -normal) {
-            let ([a, b, c], [u, v, w]) = body.place(&solid, &exit, -normal);
-            push(&exit, ([a, b, c, 0], [u, v, w, 0.0]), &[exit.point], &[1.0]);
-        }
-        let mut pushed = vec![false; query.from.len()];
-        exits.iter().for_each(|exit| pushed[exit.point as usize] = true);
         pushed
     }
 
@@ -351,16 +314,10 @@ impl CollisionScene<'_> {
                 continue;
             }
             // Points outside are left to contacts, which know how near they are.
-            let mut within = vec![false; x.len()];
-            Enclosure::new(&solid.points, &solid.surface.triangles, 0.0).mark(x, &near, &mut within);
-            let within: Vec<u32> = near.into_iter().filter(|point| within[*point as usize]).collect();
-            if within.is_empty() {
-                continue;
-            }
-            let tree = TriangleTree::build(&narrow(&solid.points), &solid.surface.triangles);
+            let within = Enclosure::new(&solid.points, &solid.surface.triangles, 0.0).within(x, near);
             let from: Vec<_> = within.iter().map(|point| x[*point as usize]).collect();
-            for (point, closest) in within.iter().zip(tree.closest_each(&narrow(&from), f32::INFINITY)) {
-                let Some(distance) = closest.map(|closest| f64::from(closest.distance)) else { continue };
+            for (point, distance) in within.iter().zip(solid.distances(&from)) {
+                let Some(distance) = distance else { continue };
                 inside[*point as usize] |= distance > TOUCHING * solid.gap;
                 found.deepest = found.deepest.max(solid.gap + distance);
             }
@@ -385,7 +342,7 @@ fn add_overlap(
 ) -> [Vec<bool>; 2] {
     let (gap, inside) = (solid.gap, [side.within(other), other.within(side)]);
     let [own, others] = [(side, &inside[0]), (other, &inside[1])].map(|(side, inside)| {
-        let all = side.candidates.iter().copied().filter(|point| inside[*point as usize]);
+        let all = side.of.candidates.iter().copied().filter(|point| inside[*point as usize]);
         all.collect::<Vec<u32>>()
     });
     if own.is_empty() && others.is_empty() {

@@ -3,8 +3,8 @@
 use super::body_skin::BodySkin;
 use super::edge;
 use super::vertex::{self, ContactRules, MovingSurface};
-use super::{CollisionScene, OverlapPartner, REACH, Yielding, collect_in_order};
-use crate::mass_spring::{Contact, ContactQuery};
+use super::{ActOnPair, Buffers, CollisionScene, OverlapPartner, REACH, Yielding, collect_in_order};
+use crate::mass_spring::{Contact, ContactQuery, Weighted};
 use numerics::swept::{self, SweptBoxTree};
 use numerics::tree::Cuboid;
 use numerics::vector::DVec3;
@@ -35,31 +35,20 @@ struct Pair<'a> {
     yielding: Yielding,
 }
 
-/// Marks the neighbourhood of some points, by the number of the query that marked them last.
-#[derive(Default)]
-struct Marks {
-    of: Vec<u32>,
-    last: u32,
-}
-
-impl Marks {
-    fn put(&mut self, skin: &BodySkin, particles: &[u32]) {
-        if self.of.is_empty() || self.last == u32::MAX {
-            self.of = vec![0; skin.len()];
-            self.last = 0;
-        }
-        self.last += 1;
-        for other in particles.iter().flat_map(|particle| skin.around(*particle)) {
-            self.of[*other as usize] = self.last;
-        }
-    }
-
-    fn have(&self, skin: &BodySkin, points: &[u32]) -> bool {
-        let marked = |point: &u32| self.of[*point as usize] == self.last;
-        points
-            .iter()
-            .any(|point| if skin.rides(*point) { skin.around(*point).iter().any(marked) } else { marked(point) })
-    }
+/// Drops those of `others` that have a point near the `points` of an element, by links of the skin. What is near these is marked
+/// with the `index` of the element.
+fn drop_neighbours<'a>(
+    skin: &BodySkin,
+    (index, points): (u32, &[u32]),
+    (others, marks): &mut Buffers,
+    points_of: impl Fn(u32) -> &'a [u32],
+) {
+    marks.resize(skin.rest.len(), 0);
+    points.iter().flat_map(|point| skin.around(*point)).for_each(|near| marks[*near as usize] = index + 1);
+    let is_marked = |point: &u32| marks[*point as usize] == index + 1;
+    let is_near =
+        |point: &u32| if skin.rides(*point) { skin.around(*point).iter().any(is_marked) } else { is_marked(point) };
+    others.retain(|other| !points_of(*other).iter().any(is_near));
 }
 
 /// Swept boxes of a skin.
@@ -72,47 +61,51 @@ struct Boxes<'a> {
 
 impl CollisionScene<'_> {
     /// All pairs of skins, then each skin with itself.
-    pub(super) fn pairs(&self, query: &ContactQuery<'_>, points: &[Cuboid], out: &mut Vec<Contact>) {
+    pub(super) fn pairs(&self, query: &ContactQuery<'_>, points: &[Cuboid], act: &mut ActOnPair<'_>) {
         let boxes = |reach: f64| -> Vec<Boxes<'_>> {
             let of = self.skins.iter().map(|skin| Boxes {
                 bounds: swept::inflated(&swept::bounds_of_finite(&skin.touching, points), reach),
-                faces: skin.faces.sweep(points, reach),
+                faces: skin.surface.swept.sweep(points, reach),
                 edges: skin.edges.sweep(points, reach),
             });
             of.collect()
         };
-        let pair = |skins: [usize; 2], self_contact: bool, params: ContactParams| Pair {
-            scene: self,
-            query,
-            points,
-            skins: skins.map(|skin| &self.skins[skin]),
-            self_contact,
-            params,
-            rules: ContactRules { gap: params.thickness, reach: REACH * params.thickness, push: !self_contact },
-            yielding: self.yielding(
-                skins[0].min(skins[1]),
-                (!self_contact).then(|| OverlapPartner::Skin(skins[0].max(skins[1]))),
-                query.times,
-            ),
+        let pair = |[first, second]: [usize; 2], params: ContactParams| {
+            let self_contact = first == second;
+            let partner = (!self_contact).then_some(OverlapPartner::Skin(first.max(second)));
+            Pair {
+                scene: self,
+                query,
+                points,
+                skins: [first, second].map(|skin| &self.skins[skin]),
+                self_contact,
+                params,
+                rules: ContactRules { gap: params.thickness, reach: REACH * params.thickness, push: !self_contact },
+                yielding: self.yielding(first.min(second), partner, query.times),
+            }
         };
         if let Some(params) = self.body_contact.filter(|_| self.skins.len() > 1) {
             let boxes = boxes(REACH * params.thickness);
             for second in 1..self.skins.len() {
                 for first in 0..second {
                     let meet = swept::overlap(&boxes[first].bounds, &boxes[second].bounds);
-                    if meet && self.separating(first, OverlapPartner::Skin(second)).is_none() {
-                        pair([first, second], false, params).particles(&boxes[second], out);
-                        pair([second, first], false, params).particles(&boxes[first], out);
-                        pair([first, second], false, params).edges(&boxes[second], out);
+                    let partner = OverlapPartner::Skin(second);
+                    if meet && self.separating(first, partner).is_none() {
+                        let mut contacts = Vec::new();
+                        pair([first, second], params).particles(&boxes[second], &mut contacts);
+                        pair([second, first], params).particles(&boxes[first], &mut contacts);
+                        pair([first, second], params).edges(&boxes[second], &mut contacts);
+                        act(first, Some(partner), contacts);
                     }
                 }
             }
         }
         if let Some(params) = self.self_contact {
             for (skin, boxes) in boxes(REACH * params.thickness).iter().enumerate() {
-                let pair = pair([skin, skin], true, params);
-                pair.particles(boxes, out);
-                pair.edges(boxes, out);
+                let (pair, mut contacts) = (pair([skin, skin], params), Vec::new());
+                pair.particles(boxes, &mut contacts);
+                pair.edges(boxes, &mut contacts);
+                act(skin, None, contacts);
             }
         }
     }
@@ -124,28 +117,24 @@ impl Pair<'_> {
         let poses = [self.query.from, self.query.to];
         let [first, second] = self.skins;
         let on = MovingSurface { surface: &second.surface, poses: &poses };
-        let find_in = |marks: &mut Marks, particles: &[u32], out: &mut Vec<Contact>| {
-            let mut faces = Vec::new();
-            for particle in particles {
-                boxes.faces.overlapping(&self.points[*particle as usize], &mut faces);
-                if self.self_contact {
-                    marks.put(first, &[*particle]);
-                    faces.retain(|face| !marks.have(first, &first.surface.triangles[*face as usize]));
-                }
-                if faces.is_empty() {
-                    continue;
-                }
-                let path = poses.map(|pose| DVec3::from(pose[*particle as usize]));
-                for hit in vertex::hits(&path, &on, (&faces, None), &|| None, &self.rules) {
-                    let [a, b, c] = second.surface.triangles[hit.face as usize];
-                    let [u, v, w] = hit.weights;
-                    let gap = self.gap(|| first.rest_to_face(*particle, hit.face));
-                    out.extend(self.contact([*particle, a, b, c], [1.0, -u, -v, -w], hit.normal, hit.shift, gap));
-                }
-            }
-        };
         let particles = if self.self_contact { &first.surface.vertices } else { &first.touching };
-        collect_in_order(particles, &find_in, out);
+        collect_in_order(particles, out, |particle, buffers, out| {
+            boxes.faces.overlapping(&self.points[particle as usize], &mut buffers.0);
+            if self.self_contact {
+                let corners = |face: u32| &first.surface.triangles[face as usize][..];
+                drop_neighbours(first, (particle, &[particle]), buffers, corners);
+            }
+            let faces = &buffers.0;
+            if faces.is_empty() {
+                return;
+            }
+            let path = poses.map(|pose| DVec3::from(pose[particle as usize]));
+            for hit in vertex::hits(&path, &on, (faces, None), &|| None, &self.rules) {
+                let corners = &second.surface.triangles[hit.face as usize];
+                let sides = [(&[particle][..], &[1.0][..]), (corners, &hit.weights)];
+                out.extend(self.contact(sides, hit.normal, hit.shift, || first.rest_to_face(particle, hit.face)));
+            }
+        });
     }
 
     /// Edges of the first skin against those of the second.
@@ -154,50 +143,38 @@ impl Pair<'_> {
         let [first, second] = self.skins;
         let [one, two] = [first, second].map(|skin| MovingSurface { surface: &skin.surface, poses: &poses });
         let indices: Vec<u32> = (0..first.surface.edges.len() as u32).collect();
-        let find_in = |marks: &mut Marks, edges: &[u32], out: &mut Vec<Contact>| {
-            let mut others = Vec::new();
-            for index in edges {
-                let edge = &first.surface.edges[*index as usize];
-                boxes.edges.overlapping(&swept::bounds_of(&edge.ends, self.points), &mut others);
-                if self.self_contact {
-                    marks.put(first, &edge.ends);
-                    others.retain(|other| {
-                        *other > *index && !marks.have(first, &first.surface.edges[*other as usize].ends)
-                    });
-                }
-                for other_index in &others {
-                    let other = &second.surface.edges[*other_index as usize];
-                    if let Some(hit) = edge::hit([&one, &two], [edge, other], &self.rules) {
-                        let [s, t] = hit.shares;
-                        let ([a, b], [c, d]) = (edge.ends, other.ends);
-                        let gap = self.gap(|| first.rest_between(*index, *other_index));
-                        out.extend(self.contact([a, b, c, d], [1.0 - s, s, t - 1.0, -t], hit.normal, 0.0, gap));
-                    }
+        collect_in_order(&indices, out, |index, buffers, out| {
+            let edge = &first.surface.edges[index as usize];
+            boxes.edges.overlapping(&swept::bounds_of(&edge.ends, self.points), &mut buffers.0);
+            if self.self_contact {
+                buffers.0.retain(|other| *other > index);
+                drop_neighbours(first, (index, &edge.ends), buffers, |other| &first.surface.edges[other as usize].ends);
+            }
+            for at in &buffers.0 {
+                let other = &second.surface.edges[*at as usize];
+                if let Some(hit) = edge::hit([&one, &two], [edge, other], &self.rules) {
+                    let sides = [(&edge.ends[..], &hit.weights[0][..]), (&other.ends, &hit.weights[1])];
+                    out.extend(self.contact(sides, hit.normal, 0.0, || first.rest_between(index, *at)));
                 }
             }
-        };
-        collect_in_order(&indices, &find_in, out);
+        });
     }
 
-    /// The gap of a pair; for elements of the same skin at most their distance at rest.
-    fn gap(&self, at_rest: impl FnOnce() -> f64) -> f64 {
-        if self.self_contact { self.params.thickness.min(at_rest()) } else { self.params.thickness }
-    }
-
-    fn contact(&self, points: [u32; 4], weights: [f64; 4], normal: DVec3, shift: f64, gap: f64) -> Option<Contact> {
-        if gap < JOINED * self.params.thickness {
+    /// The contact of two elements, if they are of the same skin with a gap that is at most their distance `at_rest`.
+    fn contact(
+        &self,
+        sides: [Weighted<'_>; 2],
+        normal: DVec3,
+        shift: f64,
+        at_rest: impl FnOnce() -> f64,
+    ) -> Option<Contact> {
+        let ContactParams { thickness, friction } = self.params;
+        let gap = if self.self_contact { thickness.min(at_rest()) } else { thickness };
+        if gap < JOINED * thickness {
             return None;
         }
-        Some(self.yielding.of(Contact {
-            points,
-            weights,
-            normal: normal.into(),
-            offset: -shift,
-            gap,
-            velocity: [0.0; 3],
-            friction: self.params.friction * self.scene.friction_scale(&points, &weights),
-            jammed: false,
-            open: false,
-        }))
+        let contact = Contact::between(sides, normal, gap);
+        let friction = friction * self.scene.friction_scale(&contact);
+        Some(self.yielding.of(Contact { offset: -shift, friction, ..contact }))
     }
 }

@@ -2,21 +2,20 @@
 //!
 //! Limit: how deep a body goes through itself is not measured, only by how many edges.
 
-use super::obstacle::narrow;
 use super::solid::{Solid, Solids};
-use super::surface::{Edge, Moment};
+use super::surface::{Edge, Moment, TriangleSurface};
 use super::{BodySkin, CollisionScene, Overlap, OverlapPartner, TASK, overlap};
 use numerics::parallel;
 use numerics::swept::{self, SweptBoxTree};
-use numerics::tree::TriangleTree;
+use numerics::tree::Cuboid;
 use numerics::vector::DVec3;
 
-/// How far edges are in a surface.
+/// How far an edge is in a surface.
 #[derive(Default)]
 struct Pierced {
-    /// Middles of the stretches of edges within a closed one.
-    within: Vec<DVec3>,
-    /// For open ones the largest distance to which both ends of an edge are on either side, metres.
+    /// Middles of its stretches within a closed one.
+    within: Vec<[f64; 3]>,
+    /// For an open one the distance to which both of its ends are on either side, metres.
     deepest: f64,
 }
 
@@ -27,7 +26,7 @@ impl CollisionScene<'_> {
         for ((index, own), skin) in solids[0].iter().enumerate().zip(self.skins) {
             let released = skin.released(&own.points);
             for other in self.partners(solids, index) {
-                let (mut edges, mut others) = (own.edges(), other.edges());
+                let (mut edges, mut others) = (own.surface.edge_indices(), other.surface.edge_indices());
                 if let OverlapPartner::Obstacle(obstacle) = other.is {
                     edges.retain(|edge| !super::has(&released.edges, *edge));
                     let sharp = &self.obstacles[obstacle].sharp_edges;
@@ -53,7 +52,11 @@ impl CollisionScene<'_> {
                     continue;
                 }
                 let [own, other] = [own, other].map(|solid| solid.below(overlap::BELOW * other.gap));
-                if own.reaches(&own.edges(), &other).max(other.reaches(&other.edges(), &own)) > 0.0 {
+                if own
+                    .reaches(&own.surface.edge_indices(), &other)
+                    .max(other.reaches(&other.surface.edge_indices(), &own))
+                    > 0.0
+                {
                     found.push(pair);
                 }
             }
@@ -66,24 +69,20 @@ impl CollisionScene<'_> {
     pub fn self_crossings(&self, x: &[[f64; 3]]) -> usize {
         let (boxes, at) = (swept::swept_boxes(&[x]), Moment::of(x));
         let of_skin = |skin: &BodySkin| -> usize {
-            let (surface, tree, rest) = (&skin.surface, skin.faces.sweep(&boxes, 0.0), Moment::of(&skin.rest));
+            let (surface, tree, rest) = (&skin.surface, skin.surface.swept.sweep(&boxes, 0.0), Moment::of(&skin.rest));
             let crosses = |edge: &Edge, face: u32, at: &Moment<'_>| {
                 crossing(edge.ends.map(|end| at.position(end)), surface.corners(at, face)).is_some()
             };
-            let goes_through = |edge: &Edge, faces: &mut Vec<u32>| {
-                tree.overlapping(&swept::bounds_of(&edge.ends, &boxes), faces);
-                faces.iter().any(|face| {
+            let crossed = surface.each_edge(&surface.edge_indices(), &boxes, &tree, |_, edge, faces| {
+                let goes_through = |face: &u32| {
                     let corners = surface.triangles[*face as usize];
                     !edge.ends.iter().any(|end| corners.contains(end))
                         && crosses(edge, *face, &at)
                         && !crosses(edge, *face, &rest)
-                })
-            };
-            let counts = parallel::map(surface.edges.chunks(TASK), |_, edges| {
-                let mut faces = Vec::new();
-                edges.iter().filter(|edge| goes_through(edge, &mut faces)).count()
+                };
+                faces.iter().copied().find(goes_through)
             });
-            counts.into_iter().sum()
+            crossed.len()
         };
         self.skins.iter().map(of_skin).sum()
     }
@@ -94,36 +93,49 @@ impl CollisionScene<'_> {
         let (skin, obstacle) = (&self.skins[skin], &self.obstacles[obstacle]);
         let points = obstacle.at(1.0);
         let [own, boxes] = [swept::swept_boxes(&[x]), swept::swept_boxes(&[&points])];
-        let tree = obstacle.faces.sweep(&boxes, 0.0);
+        let tree = obstacle.surface.swept.sweep(&boxes, 0.0);
         if !swept::overlap(&swept::bounds_of_finite(&skin.surface.vertices, &own), &tree.bounds) {
             return Vec::new();
         }
         let at = Moment::of(&points);
-        let cut = |edge: &Edge, faces: &mut Vec<u32>| {
-            tree.overlapping(&swept::bounds_of(&edge.ends, &own), faces);
+        let surface = &skin.surface;
+        surface.each_edge(&surface.edge_indices(), &own, &tree, |index, edge, faces| {
             let ends = edge.ends.map(|end| DVec3::from(x[end as usize]));
             let met = |face: &u32| Some((crossing(ends, obstacle.surface.corners(&at, *face))?.0, *face));
             let mut met: Vec<(f64, u32)> = faces.iter().filter_map(met).collect();
             met.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            Some([met.first()?.1, met.last()?.1])
-        };
-        let indices: Vec<usize> = (0..skin.surface.edges.len()).collect();
-        let parts = parallel::map(indices.chunks(TASK), |_, indices| {
+            Some((index as usize, [met.first()?.1, met.last()?.1]))
+        })
+    }
+}
+
+impl TriangleSurface {
+    fn edge_indices(&self) -> Vec<u32> {
+        (0..self.edges.len() as u32).collect()
+    }
+
+    /// What `find` makes of some edges, with their indices, and of the triangles near them among those of a `tree`. `boxes` are
+    /// those of the points.
+    fn each_edge<R: Send>(
+        &self,
+        edges: &[u32],
+        boxes: &[Cuboid],
+        tree: &SweptBoxTree<'_>,
+        find: impl Fn(u32, &Edge, &[u32]) -> Option<R> + Sync,
+    ) -> Vec<R> {
+        parallel::concat(parallel::map(edges.chunks(TASK), |_, edges| {
             let mut faces = Vec::new();
-            let found =
-                indices.iter().filter_map(|index| Some((*index, cut(&skin.surface.edges[*index], &mut faces)?)));
-            found.collect::<Vec<_>>()
-        });
-        parts.into_iter().flatten().collect()
+            let found = edges.iter().filter_map(|index| {
+                let edge = &self.edges[*index as usize];
+                tree.overlapping(&swept::bounds_of(&edge.ends, boxes), &mut faces);
+                find(*index, edge, &faces)
+            });
+            found.collect()
+        }))
     }
 }
 
 impl Solid<'_> {
-    /// The indices of all its edges.
-    fn edges(&self) -> Vec<u32> {
-        (0..self.surface.edges.len() as u32).collect()
-    }
-
     /// The same with its points moved below the surface by a distance.
     fn below(&self, distance: f64) -> Self {
         let points = overlap::below(&self.points, self.surface, distance);
@@ -133,52 +145,35 @@ impl Solid<'_> {
 
     /// The largest distance below the surface of `other` that some of its edges reach.
     fn reaches(&self, edges: &[u32], other: &Solid<'_>) -> f64 {
-        let tree = other.faces.sweep(&other.boxes, 0.0);
-        let parts = parallel::map(edges.chunks(TASK), |_, edges| {
-            let (mut pierced, mut faces) = (Pierced::default(), Vec::new());
-            edges.iter().for_each(|edge| {
-                self.pierce(&self.surface.edges[*edge as usize], (other, &tree), &mut faces, &mut pierced)
-            });
-            pierced
-        });
-        let deepest = parts.iter().map(|part| part.deepest).fold(0.0, f64::max);
-        let within: Vec<[f64; 3]> = parts.iter().flat_map(|part| &part.within).map(|point| (*point).into()).collect();
-        if within.is_empty() {
-            return deepest;
-        }
-        let solid = TriangleTree::build(&narrow(&other.points), &other.surface.triangles);
-        let closest = solid.closest_each(&narrow(&within), f32::INFINITY).into_iter().flatten();
-        closest.map(|closest| f64::from(closest.distance)).fold(deepest, f64::max)
+        let tree = other.surface.swept.sweep(&other.boxes, 0.0);
+        let pierced =
+            self.surface.each_edge(edges, &self.boxes, &tree, |_, edge, faces| self.pierce(edge, other, faces));
+        let deepest = pierced.iter().map(|pierced| pierced.deepest).fold(0.0, f64::max);
+        let within: Vec<[f64; 3]> = pierced.into_iter().flat_map(|pierced| pierced.within).collect();
+        other.distances(&within).into_iter().flatten().fold(deepest, f64::max)
     }
 
-    fn pierce(
-        &self,
-        edge: &Edge,
-        (other, tree): (&Solid<'_>, &SweptBoxTree<'_>),
-        faces: &mut Vec<u32>,
-        pierced: &mut Pierced,
-    ) {
-        tree.overlapping(&swept::bounds_of(&edge.ends, &self.boxes), faces);
+    /// How far an edge is in `other`, which it may cross at some `faces`.
+    fn pierce(&self, edge: &Edge, other: &Solid<'_>, faces: &[u32]) -> Option<Pierced> {
         let [p, q] = edge.ends.map(|end| DVec3::from(self.points[end as usize]));
-        let at = Moment::of(&other.points);
+        let (at, mut pierced) = (Moment::of(&other.points), Pierced::default());
         // Where it goes in, and where it comes out.
         let mut crossed: Vec<(f64, bool)> = Vec::new();
-        for face in faces.iter() {
+        for face in faces {
             let corners = other.surface.corners(&at, *face);
             let Some((share, sides)) = crossing([p, q], corners) else { continue };
             crossed.push((share, sides[0] > 0.0));
-            if !other.surface.closed {
-                pierced.deepest = pierced.deepest.max(sides[0].abs().min(sides[1].abs()));
-            }
-        }
-        if crossed.is_empty() || !other.surface.closed {
-            return;
+            pierced.deepest = pierced.deepest.max(sides[0].abs().min(sides[1].abs()));
         }
         crossed.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let ends = [(0.0, !crossed[0].1), (1.0, false)];
-        let all: Vec<(f64, bool)> = [ends[0]].into_iter().chain(crossed).chain([ends[1]]).collect();
-        let stretches = all.windows(2).filter(|pair| pair[0].1);
-        pierced.within.extend(stretches.map(|pair| p.lerp(&q, 0.5 * (pair[0].0 + pair[1].0))));
+        if other.surface.closed {
+            let begins = (0.0, !crossed.first()?.1);
+            let all: Vec<(f64, bool)> = [begins].into_iter().chain(crossed).chain([(1.0, false)]).collect();
+            let stretches = all.windows(2).filter(|pair| pair[0].1);
+            let middles = stretches.map(|pair| p.lerp(&q, 0.5 * (pair[0].0 + pair[1].0)).into());
+            pierced = Pierced { within: middles.collect(), deepest: 0.0 };
+        }
+        Some(pierced)
     }
 }
 

@@ -1,9 +1,10 @@
 //! Surfaces of skins and obstacles at one time, and which of them may overlap.
 
+use super::obstacle::narrow;
 use super::surface::TriangleSurface;
 use super::{CollisionScene, OverlapPartner};
-use numerics::swept::{self, SweptElements};
-use numerics::tree::Cuboid;
+use numerics::swept;
+use numerics::tree::{Cuboid, TriangleTree};
 use std::borrow::Cow;
 
 /// A skin or an obstacle at one time.
@@ -11,7 +12,6 @@ use std::borrow::Cow;
 pub(super) struct Solid<'a> {
     pub(super) is: OverlapPartner,
     pub(super) surface: &'a TriangleSurface,
-    pub(super) faces: &'a SweptElements<3>,
     pub(super) points: Cow<'a, [[f64; 3]]>,
     /// Boxes of the points.
     pub(super) boxes: Cow<'a, [Cuboid]>,
@@ -20,6 +20,18 @@ pub(super) struct Solid<'a> {
     pub(super) bounds: Cuboid,
     /// Distance to keep from it, metres.
     pub(super) gap: f64,
+}
+
+impl Solid<'_> {
+    /// The distance of each of `points` from its surface, metres; `None` where there is none.
+    pub(super) fn distances(&self, points: &[[f64; 3]]) -> Vec<Option<f64>> {
+        if points.is_empty() {
+            return Vec::new();
+        }
+        let tree = TriangleTree::build(&narrow(&self.points), &self.surface.triangles);
+        let closest = tree.closest_each(&narrow(points), f32::INFINITY);
+        closest.into_iter().map(|closest| Some(f64::from(closest?.distance))).collect()
+    }
 }
 
 /// Skins, and obstacles.
@@ -31,7 +43,6 @@ impl CollisionScene<'_> {
         let skins = self.skins.iter().enumerate().map(|(index, skin)| Solid {
             is: OverlapPartner::Skin(index),
             surface: &skin.surface,
-            faces: &skin.faces,
             points: x.into(),
             boxes: boxes.into(),
             candidates: &skin.touching,
@@ -44,7 +55,6 @@ impl CollisionScene<'_> {
             Solid {
                 is: OverlapPartner::Obstacle(index),
                 surface: &obstacle.surface,
-                faces: &obstacle.faces,
                 points: points.into(),
                 candidates: &obstacle.surface.vertices,
                 bounds: swept::bounds_of_finite(&obstacle.surface.vertices, &boxes),

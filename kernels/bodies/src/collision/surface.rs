@@ -4,6 +4,7 @@
 //! keeps the first two.
 
 use numerics::closest_point::{ClosestPoint, TriangleFeature};
+use numerics::swept::SweptElements;
 use numerics::vector::DVec3;
 
 /// No triangle.
@@ -13,6 +14,8 @@ pub(super) const NONE: u32 = u32::MAX;
 #[derive(Clone, Debug)]
 pub(super) struct TriangleSurface {
     pub(super) triangles: Vec<[u32; 3]>,
+    /// The triangles, for swept boxes.
+    pub(super) swept: SweptElements<3>,
     pub(super) edges: Vec<Edge>,
     /// Edges of each triangle, from corner k to k + 1.
     sides: Vec<[u32; 3]>,
@@ -88,8 +91,8 @@ impl<'a> Moment<'a> {
 }
 
 impl TriangleSurface {
-    /// Connectivity of `triangles` over `points` points; indices must be in range.
-    pub(super) fn new(points: usize, triangles: &[[u32; 3]]) -> Self {
+    /// Connectivity of `triangles` over points, of which some `pose` is given; indices must be in range.
+    pub(super) fn new(pose: Positions<'_>, triangles: &[[u32; 3]]) -> Self {
         let mut halves: Vec<([u32; 2], u32, u32)> = Vec::with_capacity(3 * triangles.len());
         for (face, corners) in (0u32..).zip(triangles).filter(|(_, [a, b, c])| a != b && b != c && c != a) {
             for k in 0..3u32 {
@@ -100,6 +103,7 @@ impl TriangleSurface {
         halves.sort_unstable();
         let mut surface = Self {
             triangles: triangles.to_vec(),
+            swept: SweptElements::new(triangles.to_vec(), pose),
             edges: Vec::with_capacity(halves.len() / 2),
             sides: vec![[NONE; 3]; triangles.len()],
             around: Lists::default(),
@@ -121,8 +125,8 @@ impl TriangleSurface {
             surface.edges.push(edge);
         }
         let ends = (0..).zip(&surface.edges).flat_map(|(index, edge)| edge.ends.map(|end| [end, index]));
-        surface.around = Lists::new(points, ends.collect());
-        surface.vertices = (0..points as u32).filter(|point| !surface.around.of(*point).is_empty()).collect();
+        surface.around = Lists::new(pose.len(), ends.collect());
+        surface.vertices = (0..pose.len() as u32).filter(|point| !surface.around.of(*point).is_empty()).collect();
         surface
     }
 
@@ -148,9 +152,9 @@ impl TriangleSurface {
         each.reduce(|best, next| if next.distance < best.distance { next } else { best })
     }
 
-    /// Unit normal; `None` for a triangle without area.
+    /// Unit normal; `None` without a triangle, and for one without area.
     pub(super) fn normal(&self, at: &Moment<'_>, face: u32) -> Option<DVec3> {
-        let [a, b, c] = self.corners(at, face);
+        let [a, b, c] = self.triangles.get(face as usize)?.map(|corner| at.position(corner));
         let (ab, ac) = (b - a, c - a);
         let normal = ab.cross(&ac);
         let length = normal.norm();
@@ -171,7 +175,7 @@ impl TriangleSurface {
     /// 2005), which gives the correct side for any point that has this one as its closest.
     pub(super) fn outward(&self, at: &Moment<'_>, nearest: &ClosestPoint) -> DVec3 {
         let corners = self.triangles[nearest.face as usize];
-        let normal = |face: u32| if face == NONE { DVec3::zeros() } else { self.normal(at, face).unwrap_or_default() };
+        let normal = |face: u32| self.normal(at, face).unwrap_or_default();
         match nearest.feature() {
             TriangleFeature::Inside => normal(nearest.face),
             TriangleFeature::Side(k) => match self.side(nearest.face, k) {
@@ -216,8 +220,8 @@ impl TriangleSurface {
     }
 
     /// Walks across nearly flat edges to the triangle whose projection contains `point`: the contact plane of a point
-    /// that slid on from where it crossed the surface.
-    pub(super) fn walk_to(&self, at: &Moment<'_>, face: u32, point: DVec3) -> Settled {
+    /// that slid on from where it crossed the surface. Returns the closest point there, and the normal.
+    pub(super) fn walk_to(&self, at: &Moment<'_>, face: u32, point: DVec3) -> (ClosestPoint, Option<DVec3>) {
         /// Largest number of triangles passed.
         const MOST: usize = 64;
         /// Cosine of the angle at an edge beyond which the next triangle belongs to another side.
@@ -237,13 +241,6 @@ impl TriangleSurface {
             let Some((next, there)) = next else { break };
             (before, face, normal) = (face, next, Some(there));
         }
-        Settled { nearest: ClosestPoint::on(face, point, self.corners(at, face)), normal }
+        (ClosestPoint::on(face, point, self.corners(at, face)), normal)
     }
-}
-
-/// Result of [`TriangleSurface::walk_to`].
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Settled {
-    pub(super) nearest: ClosestPoint,
-    pub(super) normal: Option<DVec3>,
 }

@@ -3,7 +3,7 @@
 //! The side that the point came from decides. A closed surface can only be entered from outside; an open one has
 //! two sides. After the first crossing only that triangle counts; other triangles are judged at that time.
 
-use super::surface::{Moment, Positions, Settled, TriangleSurface};
+use super::surface::{Moment, Positions, TriangleSurface};
 use numerics::closest_point::ClosestPoint;
 use numerics::coplanarity::{MotionSeparation, face_separation, sign_changes};
 use numerics::vector::DVec3;
@@ -27,6 +27,11 @@ impl<'a> MovingSurface<'a> {
 
     pub(super) fn end(&self) -> Moment<'a> {
         Moment::of(self.poses[self.poses.len() - 1])
+    }
+
+    /// Positions of a point in all poses.
+    pub(super) fn path(&self, point: u32) -> Vec<DVec3> {
+        self.poses.iter().map(|pose| DVec3::from(pose[point as usize])).collect()
     }
 
     /// Positions at a time that counts poses.
@@ -74,7 +79,7 @@ pub(super) fn entered(path: &[DVec3], on: &MovingSurface<'_>, faces: &[u32]) -> 
 /// The point of a surface that keeps `point` out, for one that went in through `face`; `None` once it is out again on
 /// that side.
 pub(super) fn way_back(surface: &TriangleSurface, at: &Moment<'_>, face: u32, point: DVec3) -> Option<ClosestPoint> {
-    let nearest = surface.walk_to(at, face, point).nearest;
+    let nearest = surface.walk_to(at, face, point).0;
     is_behind(surface, at, &nearest, point).then_some(nearest)
 }
 
@@ -90,7 +95,7 @@ pub(super) fn hits(
 ) -> Vec<Hit> {
     let (surface, end) = (on.surface, path[path.len() - 1]);
     let plane = |face: u32, side: f64, shift: f64| {
-        let Settled { nearest, normal } = surface.walk_to(&on.end(), face, end);
+        let (nearest, normal) = surface.walk_to(&on.end(), face, end);
         let normal = normal.or_else(|| surface.normal(&on.start(), face))? * side;
         let clearance = normal.dot(&(end - nearest.point)) + shift;
         Some(Hit { face: nearest.face, weights: nearest.weights, normal, shift, clearance })

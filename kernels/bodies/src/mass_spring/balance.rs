@@ -9,26 +9,29 @@ use super::springs;
 use super::stage::Stage;
 use super::step::{Interval, Kinematics, Stepper};
 use numerics::vector::DVec3;
+use std::ops::Range;
+
+/// A step that was taken.
+#[derive(Clone, Copy)]
+pub(super) struct TakenStep<'a> {
+    pub(super) interval: Interval<'a>,
+    pub(super) end: &'a Kinematics,
+    pub(super) contacts: &'a [ContactConstraint],
+}
 
 impl Stepper<'_> {
     /// Energy that a step loses without damping, drag or friction, joules: through time stepping, through contacts,
     /// which should store energy and give it back, and through limits on it. `energies` are those at both ends.
-    pub(super) fn energy_lost(
-        &mut self,
-        [before, after]: [&Energies; 2],
-        step: Interval<'_>,
-        motion: &Kinematics,
-        contacts: &[ContactConstraint],
-    ) -> f64 {
-        let Interval { start, times, h } = step;
+    pub(super) fn energy_lost(&mut self, [before, after]: [&Energies; 2], taken: TakenStep<'_>) -> f64 {
+        let TakenStep { interval: Interval { start, times, h }, end, contacts } = taken;
         let (body, external) = (self.context.body, self.context.external);
-        let moved = |particle: usize| motion.x[particle] - start.x[particle];
+        let moved = |particle: usize| end.x[particle] - start.x[particle];
         let clusters = &body.order.clusters;
         let [then, now] = times.map(|time| external.at(time));
         let given: f64 = clusters.sum((), |cluster, ()| {
             let of = |particle: usize| {
                 let ends = ([&then, &now], h);
-                external.work(particle, body.mass[particle], ends, motion.x[particle], moved(particle))
+                external.work(particle, body.mass[particle], ends, end.x[particle], moved(particle))
             };
             clusters.range(cluster).map(of).sum()
         });
@@ -41,14 +44,14 @@ impl Stepper<'_> {
             let displacement: DVec3 = contact.sides().map(|(particle, weight)| moved(particle) * weight).sum();
             (state.force - normal).dot(&displacement) + normal.dot(&contact.velocity) * h
         });
-        let by_contacts = by_contacts.sum::<f64>() + self.work_of_missing_forces(step, motion, contacts);
+        let by_contacts = by_contacts.sum::<f64>() + self.work_of_missing_forces(taken);
         let damped = after.dashed / h + self.solver.volumes.dissipated(h);
         let pins: Vec<usize> = external.moving_pins().collect();
         let mut by_pins = 0.0;
         if !pins.is_empty() {
             let stage = Stage { contacts, ..Stage::new(self.context, [&[], &[]], h, times[1]) };
-            let force = self.solver.forces(&stage, &motion.x, &motion.v);
-            let reaction = |pin: usize| (motion.v[pin] - start.v[pin]) * (body.mass[pin] / h) - force[pin];
+            let force = self.solver.forces(&stage, &end.x, &end.v);
+            let reaction = |pin: usize| (end.v[pin] - start.v[pin]) * (body.mass[pin] / h) - force[pin];
             by_pins = pins.into_iter().map(|pin| reaction(pin).dot(&moved(pin))).sum();
         }
         let lost = before.sum() - after.sum() + given + by_contacts + by_pins - damped;
@@ -57,12 +60,8 @@ impl Stepper<'_> {
 
     /// Work of moving obstacles by what contact forces at the end of a step lack of those that
     /// changed the momentum of each piece, joules.
-    fn work_of_missing_forces(
-        &self,
-        Interval { start, times, h }: Interval<'_>,
-        end: &Kinematics,
-        contacts: &[ContactConstraint],
-    ) -> f64 {
+    fn work_of_missing_forces(&self, taken: TakenStep<'_>) -> f64 {
+        let TakenStep { interval: Interval { start, times, h }, end, contacts } = taken;
         let (body, external) = (self.context.body, self.context.external);
         // For each piece its missing force, and velocities of obstacles with the sum of their weights.
         let mut pieces = vec![(DVec3::zeros(), DVec3::zeros(), 0.0); body.order.pieces.len()];
@@ -80,8 +79,7 @@ impl Stepper<'_> {
             }
         }
         let (mut work, now) = (0.0, external.at(times[1]));
-        for (piece, (mut missing, velocity, sum)) in body.order.pieces.iter().zip(pieces) {
-            let particles = body.particles(piece);
+        for (particles, (mut missing, velocity, sum)) in body.pieces().zip(pieces) {
             if velocity == DVec3::zeros() || external.held[particles.clone()].contains(&true) {
                 continue;
             }
@@ -95,18 +93,13 @@ impl Stepper<'_> {
         work
     }
 
-    /// The largest error of the speed of a piece in contact by a step that ends with `end`, a root mean square over its
-    /// particles, relative to the speed that it would have if all its energy, with what its dashpots took, were kinetic.
-    /// `errors` are those of positions. What is pinned does not bounce.
-    pub(super) fn impact_error(
-        &self,
-        Interval { start, h, .. }: Interval<'_>,
-        end: &Kinematics,
-        contacts: &[ContactConstraint],
-        errors: &[DVec3],
-    ) -> f64 {
+    /// The largest error of the speed of a piece in contact by a step, a root mean square over its particles, relative to
+    /// the speed that it would have if all its energy, with what its dashpots took, were kinetic. `errors` are those of
+    /// positions. What is pinned does not bounce.
+    pub(super) fn impact_error(&self, taken: TakenStep<'_>, errors: &[DVec3]) -> f64 {
         /// Speeds below what gravity gives in this many frames are not resolved: what rests, or is rolled, does not bounce.
         const SLOW: f64 = 3.0;
+        let TakenStep { interval: Interval { start, h, .. }, end, contacts } = taken;
         let body = self.context.body;
         // The squared speed of what each piece touches.
         let mut touched = vec![-1.0; body.order.pieces.len()];
@@ -129,10 +122,10 @@ impl Stepper<'_> {
             sums[2] += 2.0 * body.damping[at] * (now - then) * (now - then) / h;
         }
         let slow = SLOW * DVec3::from(self.frame.gravity).norm() * self.seconds;
-        let of_piece = |(index, piece): (usize, &std::ops::Range<usize>)| {
+        let of_piece = |(index, particles): (usize, Range<usize>)| {
             let [mut before, mut after, damped] = energy[index];
             let (mut mass, mut wrong) = (0.0, 0.0);
-            for particle in body.particles(piece) {
+            for particle in particles {
                 mass += body.mass[particle];
                 before += body.mass[particle] * start.v[particle].norm_squared();
                 after += body.mass[particle] * end.v[particle].norm_squared();
@@ -142,10 +135,9 @@ impl Stepper<'_> {
             let wrong = 4.0 * wrong / (mass * h * h);
             if wrong > 0.0 { (wrong / scale).sqrt() } else { 0.0 }
         };
-        let held = &self.context.external.held;
-        let is_held = |piece: &std::ops::Range<usize>| held[body.particles(piece)].contains(&true);
-        let pieces = body.order.pieces.iter().enumerate();
-        let is_heap = |piece| self.solver.heaps.get(body.particles(piece).start) == Some(&true);
+        let is_held = |piece: &Range<usize>| self.context.external.held[piece.clone()].contains(&true);
+        let is_heap = |piece: &Range<usize>| self.solver.heaps.get(piece.start) == Some(&true);
+        let pieces = body.pieces().enumerate();
         let free = pieces.filter(|(index, piece)| touched[*index] >= 0.0 && !is_held(piece) && !is_heap(piece));
         free.map(of_piece).fold(0.0, f64::max)
     }

@@ -14,11 +14,13 @@ use super::regions::Regions;
 use super::spacing::spacings;
 use super::tet_springs::{EDGES, edges, neighbours_of_missing};
 use crate::embedding::{EmbeddedPoint, with_riding};
+use crate::tets::bounds;
 use numerics::adjacency::Adjacency;
 use numerics::cluster_order::ClusterOrder;
 use numerics::masked::Masked;
 use numerics::partition::Partition;
 use numerics::vector::DVec3;
+use std::ops::Range;
 
 /// Shortest length used in k = E·ΣV/L², as a fraction of the mean length: bounds k at duplicate points to 1e6 times
 /// that of other springs.
@@ -31,10 +33,8 @@ const FLAT: f64 = 1e-6;
 
 /// The mean of a masked number over some particles, clamped to be non-negative.
 fn mean_over<const N: usize>(number: &Masked<'_, f64>, particles: [u32; N]) -> f64 {
-    let scale = number.mask.map_or(1.0, |mask| {
-        particles.iter().map(|particle| f64::from(mask[*particle as usize])).sum::<f64>() / N as f64
-    });
-    (number.value * scale).max(0.0)
+    let factors = particles.map(|particle| f64::from(number.factor(particle as usize)));
+    (number.value * (factors.iter().sum::<f64>() / N as f64)).max(0.0)
 }
 
 /// A tetrahedral mesh at rest.
@@ -238,29 +238,28 @@ impl SoftBody {
         for ((tet, volume), modulus) in self.tets.iter().zip(&self.volumes).zip(&self.moduli) {
             stiff[tet[0] as usize] += volume * modulus;
         }
-        let ratio = |piece: &std::ops::Range<usize>| {
-            let particles = self.particles(piece);
+        let ratio = |particles: Range<usize>| {
             let along = self.rest[particles.clone()].iter().map(|x| gravity.dot(x));
             let (low, high) =
                 along.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
             stiff[particles.clone()].iter().sum::<f64>() / (self.mass_of(particles) * (high - low))
         };
-        self.order.pieces.iter().map(ratio).collect()
+        self.pieces().map(ratio).collect()
     }
 
-    /// The particles of a piece.
-    pub(super) fn particles(&self, piece: &std::ops::Range<usize>) -> std::ops::Range<usize> {
-        let clusters = &self.order.clusters;
-        clusters.range(piece.start).start..clusters.range(piece.end - 1).end
+    /// The particles of each piece.
+    pub(super) fn pieces(&self) -> impl Iterator<Item = Range<usize>> {
+        let clusters = |cluster: usize| self.order.clusters.range(cluster);
+        self.order.pieces.iter().map(move |piece| clusters(piece.start).start..clusters(piece.end - 1).end)
     }
 
     /// Mass of some particles, kilograms.
-    pub(super) fn mass_of(&self, particles: std::ops::Range<usize>) -> f64 {
+    pub(super) fn mass_of(&self, particles: Range<usize>) -> f64 {
         self.mass[particles].iter().sum()
     }
 
     /// The mean of `values` over some particles, weighted by mass.
-    pub(super) fn mean_by_mass(&self, particles: std::ops::Range<usize>, values: &[DVec3]) -> DVec3 {
+    pub(super) fn mean_by_mass(&self, particles: Range<usize>, values: &[DVec3]) -> DVec3 {
         let each = particles.clone().map(|particle| values[particle] * self.mass[particle]);
         each.sum::<DVec3>() / self.mass_of(particles)
     }
@@ -365,7 +364,7 @@ impl SoftBody {
         }
 
         let (mut ends, tet_springs) = edges(mesh.tets);
-        let means = neighbours_of_missing(mesh, &ends, &tet_springs);
+        let means = neighbours_of_missing(mesh, &ends);
         ends.extend(mesh.missing);
         let mesh_spring_count = ends.len();
         ends.extend(joints.iter().map(|spring| spring.ends));
@@ -390,8 +389,7 @@ impl SoftBody {
         let rest: Vec<DVec3> = order.caller_of.iter().map(|caller| points[*caller as usize]).collect();
         let (kept, tets) = with_volume(mesh, &points, &order);
         let volumes: Vec<f64> = kept.iter().map(|tet| given[*tet as usize].volume).collect();
-        let low = rest.iter().fold(DVec3::repeat(f64::INFINITY), |low, p| low.inf(p));
-        let high = rest.iter().fold(DVec3::repeat(f64::NEG_INFINITY), |high, p| high.sup(p));
+        let [low, high] = bounds(mesh.points.iter().copied()).map(DVec3::from);
         let regions = Regions::new(&rest, &tets);
         let adjacency = Adjacency::new(&order.clusters, &ends);
         let layout = Layout::new(&order, &adjacency, &regions);

@@ -102,29 +102,23 @@ impl Stepper<'_> {
         Interval { start, h, .. }: Interval<'_>,
         motion: &mut Kinematics,
     ) -> Option<f64> {
-        if contacts.is_empty() && motion.carried.impacts.is_empty() {
-            return None;
-        }
         let mut now = Touch::all(contacts, &motion.x, &self.context.body.layout);
         let known = std::mem::take(&mut motion.carried.impacts);
         let mut work: Option<f64> = None;
         for mut impact in known {
-            match now.remove(&impact.pieces) {
-                Some(touch) => {
-                    (impact.touch, impact.apart) = (touch, 0.0);
-                    impact.approach = impact.approach.max(self.approach(&touch, &impact.pieces, start));
-                    motion.carried.impacts.push(impact);
+            if let Some(touch) = now.remove(&impact.pieces) {
+                (impact.touch, impact.apart) = (touch, 0.0);
+                impact.approach = impact.approach.max(self.approach(&touch, &impact.pieces, start));
+            } else {
+                if impact.apart == 0.0
+                    && let Some(more) = self.slow(bounce, &impact, motion)
+                {
+                    *work.get_or_insert(0.0) += more;
                 }
-                None => {
-                    let just = impact.apart == 0.0;
-                    if let Some(more) = just.then(|| self.slow(bounce, &impact, motion)).flatten() {
-                        work = Some(work.unwrap_or(0.0) + more);
-                    }
-                    impact.apart += h;
-                    if impact.apart <= self.seconds {
-                        motion.carried.impacts.push(impact);
-                    }
-                }
+                impact.apart += h;
+            }
+            if impact.apart <= self.seconds {
+                motion.carried.impacts.push(impact);
             }
         }
         for (pieces, touch) in now {
@@ -147,8 +141,7 @@ impl Stepper<'_> {
 
     fn rotating(&self, piece: usize, motion: &Kinematics) -> Option<RigidMotion> {
         let (body, held) = (self.context.body, &self.context.external.held);
-        let piece = body.order.pieces.get(piece)?;
-        Some(RigidMotion::new(body, held, piece, [&motion.x, &motion.v, &motion.v]))
+        Some(RigidMotion::new(body, held, body.pieces().nth(piece)?, [&motion.x, &motion.v, &motion.v]))
     }
 
     /// The speed at which pieces approach each other, as wholes or where they touch.

@@ -41,36 +41,29 @@ impl ContactFilters {
         }
         // Terms that the coarse matrix leaves out anchor both their sides.
         let end = if envelope(layout, system).0 < system.transient.len() { usize::MAX } else { system.anchors };
-        for particle in 0..system.inertia.len() {
+        let filter = |particle: usize| {
             if system.isolated[particle] {
-                filters.insert(particle, system.inertia.len(), [[0.0; 3]; 3]);
-                continue;
+                return Some(DMat3::zeros());
             }
             let mut block = system.blocks.get(particle).copied().unwrap_or_default();
             system.transient.add_block(particle, 1.0, end, &mut block);
             if system.held[particle] || block.iter().all(|x| *x == 0.0) {
-                continue;
+                return None;
             }
             let smoother = &system.smoother[particle];
             let resisted = [DVec3::x(), DVec3::y(), DVec3::z()]
                 .map(|axis| solve_lower_transpose(smoother, solve_lower(smoother, times(&block, axis))));
-            if resisted.iter().all(|column| column.amax() < NEGLIGIBLE) {
-                continue;
+            let is_free = resisted.iter().all(|column| column.amax() < NEGLIGIBLE);
+            (!is_free).then(|| DMat3::identity() - DMat3::from_columns(&resisted))
+        };
+        for particle in 0..system.inertia.len() {
+            if let Some(filter) = filter(particle) {
+                filters.of.resize(system.inertia.len(), FREE);
+                filters.of[particle] = filters.filters.len() as u32;
+                filters.filters.push(filter.data.0);
             }
-            let filter = std::array::from_fn(|k| {
-                let mut column = -resisted[k];
-                column[k] += 1.0;
-                column.into()
-            });
-            filters.insert(particle, system.inertia.len(), filter);
         }
         filters
-    }
-
-    fn insert(&mut self, particle: usize, count: usize, filter: [[f64; 3]; 3]) {
-        self.of.resize(count, FREE);
-        self.of[particle] = self.filters.len() as u32;
-        self.filters.push(filter);
     }
 
     /// Mean difference from `others`: 1 if, for example, all contacts have opened.
@@ -119,9 +112,8 @@ impl Layout {
             let [_, across] = adjacency.of(particle, &adjacency.incident);
             across.iter().for_each(|incident| layout.join(&mut first, [particle, incident.other as usize].into_iter()));
         }
-        for ends in regions.starts.windows(2) {
-            let particles = &regions.particles[ends[0] as usize..ends[1] as usize];
-            layout.join(&mut first, particles.iter().map(|particle| *particle as usize));
+        for region in 0..regions.len() {
+            layout.join(&mut first, regions.of(region).iter().map(|particle| *particle as usize));
         }
         layout.first = first;
         layout

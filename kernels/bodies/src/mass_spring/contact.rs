@@ -36,8 +36,11 @@ const SAME_DIRECTION: f64 = 0.7;
 /// Slip, in body lengths a second, above which friction is μN; proportional below.
 const CREEP: f64 = 2e-5;
 
+/// Some points, and their weights.
+pub(crate) type Weighted<'a> = (&'a [u32], &'a [f64]);
+
 /// Two surfaces that may touch. With u = Σ wᵢxᵢ, n·u − offset is the distance of the first from the second.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Contact {
     /// The contact points involved, those of the first surface first; entries of weight 0 are unused.
     pub points: [u32; 4],
@@ -62,6 +65,17 @@ pub struct Contact {
 }
 
 impl Contact {
+    /// A contact at rest and without friction of points of one surface with points of another, none of an obstacle.
+    pub(crate) fn between([first, second]: [Weighted<'_>; 2], normal: DVec3, gap: f64) -> Self {
+        let mut contact = Self { normal: normal.into(), gap, ..Self::default() };
+        let all = [(first, 1.0), (second, -1.0)].into_iter();
+        let all = all.flat_map(|((points, weights), sign)| points.iter().zip(weights.iter().map(move |w| w * sign)));
+        for (slot, (point, weight)) in all.enumerate() {
+            (contact.points[slot], contact.weights[slot]) = (*point, weight);
+        }
+        contact
+    }
+
     /// Depth below its gap with contact points at `x`, metres; negative above it.
     pub(crate) fn depth(&self, x: &[[f64; 3]]) -> f64 {
         let sides = self.points.iter().zip(self.weights).filter(|side| side.1 != 0.0);
@@ -76,21 +90,16 @@ const MOST_PARTICLES: usize = 16;
 /// A contact as the solver treats it, with particles in the solver's order.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ContactConstraint {
-    /// The contact points involved; those that ride along count on from the particles.
-    pub(super) points: [u32; 4],
-    pub(super) point_weights: [f64; 4],
-    /// The particles that these depend on, each once, and their weights; and how many there are, in all and of the first
+    /// As it was detected. Its points that are particles are in the solver's order; those that ride along count on from these.
+    pub(super) of: Contact,
+    /// The particles that its points depend on, each once, and their weights; and how many there are, in all and of the first
     /// surface.
     pub(super) particles: [u32; MOST_PARTICLES],
     weights: [f64; MOST_PARTICLES],
     counts: [usize; 2],
+    /// Its unit normal, and its velocity.
     pub(super) normal: DVec3,
-    offset: f64,
-    pub(super) gap: f64,
     pub(super) velocity: DVec3,
-    pub(super) friction: f64,
-    jammed: bool,
-    pub(super) open: bool,
     /// Whether it is between skin of heaps, or of one and another body: any depth is accepted.
     pub(super) of_heap: bool,
     /// Penalty stiffness κ, N/m.
@@ -152,27 +161,18 @@ impl ContactConstraint {
         if !finite || !contact.offset.is_finite() || !contact.gap.is_finite() {
             return None;
         }
-        let mut constraint = Self {
-            point_weights: contact.weights,
-            normal,
-            offset: contact.offset,
-            gap: contact.gap.max(0.0),
-            velocity: DVec3::from(contact.velocity),
-            friction: contact.friction.max(0.0),
-            jammed: contact.jammed,
-            open: contact.open,
-            ..Self::default()
-        };
+        let (gap, friction) = (contact.gap.max(0.0), contact.friction.max(0.0));
+        let of = Contact { points: [0; 4], gap, friction, ..*contact };
+        let mut constraint = Self { of, normal, velocity: contact.velocity.into(), ..Self::default() };
         for k in 0..4 {
             if contact.weights[k] != 0.0 {
                 constraint.add_point(body, k, contact.points[k] as usize)?;
             }
         }
-        let (gap, two_sided) = (constraint.gap, constraint.is_two_sided());
+        let two_sided = constraint.is_two_sided();
         let stiff = |particle| scale.resistance(body, particle, gap, two_sided);
         let yielding = constraint.sides().fold(0.0, |sum, side| sum + side.1 * side.1 / stiff(side.0));
-        let of_heap = two_sided && constraint.sides().any(|side| scale.heaps.get(side.0) == Some(&true));
-        constraint.of_heap = of_heap;
+        constraint.of_heap = two_sided && constraint.sides().any(|side| scale.heaps.get(side.0) == Some(&true));
         constraint.penalty_stiffness = PENALTY_RATIO / yielding;
         constraint.stick_limit = STICK_RATIO * constraint.penalty_stiffness * scale.seconds;
         (yielding > 0.0 && constraint.penalty_stiffness.is_finite()).then_some(constraint)
@@ -180,12 +180,12 @@ impl ContactConstraint {
 
     /// Adds a contact point of the caller's: a particle, or the particles that it rides along on.
     fn add_point(&mut self, body: &SoftBody, k: usize, point: usize) -> Option<()> {
-        let (of_particle, weight) = (body.order.index_of.get(point), self.point_weights[k]);
+        let (of_particle, weight) = (body.order.index_of.get(point), self.of.weights[k]);
         let carrier = match of_particle {
             Some(_) => EmbeddedPoint::at_particle(point as u32),
             None => *body.riding.get(point - body.len())?,
         };
-        self.points[k] = of_particle.copied().unwrap_or(point as u32);
+        self.of.points[k] = of_particle.copied().unwrap_or(point as u32);
         for (particle, share) in carrier.sides() {
             let (particle, count) = (body.order.index_of[particle as usize], self.counts[0]);
             let known = self.particles[..count].iter().position(|known| *known == particle).unwrap_or(count);
@@ -212,23 +212,23 @@ impl ContactConstraint {
 
     /// The contact points with their weights.
     pub(super) fn points(&self) -> impl Iterator<Item = (usize, f64)> {
-        let points: [(usize, f64); 4] = std::array::from_fn(|k| (self.points[k] as usize, self.point_weights[k]));
+        let points: [(usize, f64); 4] = std::array::from_fn(|k| (self.of.points[k] as usize, self.of.weights[k]));
         points.into_iter().filter(|(_, weight)| *weight != 0.0)
     }
 
     /// Whether it is between bodies: the sum of its weights is 0 there, and 1 with an obstacle.
     pub(super) fn is_two_sided(&self) -> bool {
-        self.point_weights.iter().sum::<f64>().abs() < 0.5
+        self.of.weights.iter().sum::<f64>().abs() < 0.5
     }
 
     /// Whether it is closed at `x` although the obstacle leaves no room there.
     pub(super) fn is_jammed(&self, x: &[DVec3]) -> bool {
-        self.jammed && self.clearance(x, 0.0) < 0.0
+        self.of.jammed && self.clearance(x, 0.0) < 0.0
     }
 
     /// Depth as a fraction of the gap.
     fn gap_fraction(&self, depth: f64) -> f64 {
-        if self.gap > 0.0 { depth / self.gap } else { 0.0 }
+        if self.of.gap > 0.0 { depth / self.of.gap } else { 0.0 }
     }
 
     /// Whether the contact is too deep to be accepted at `x`.
@@ -248,13 +248,13 @@ impl ContactConstraint {
     pub(super) fn overshoot(&self, x: &[DVec3], to: &[DVec3]) -> Option<f64> {
         let (before, after) = (self.depth(x, 0.0), self.depth(to, 0.0));
         let [most, stop] = if before > 0.0 { CLOSED_LIMIT } else { OPEN_LIMIT };
-        let left = before.max(stop * self.gap);
-        (self.gap > 0.0 && after > most * self.gap && after > left).then_some(after - left)
+        let left = before.max(stop * self.of.gap);
+        (self.of.gap > 0.0 && after > most * self.of.gap && after > left).then_some(after - left)
     }
 
     /// Whether it is that of a single point of a body.
     pub(super) fn is_of_one_point(&self) -> bool {
-        self.point_weights.iter().filter(|weight| **weight != 0.0).count() == 1
+        self.of.weights.iter().filter(|weight| **weight != 0.0).count() == 1
     }
 
     /// Moves those of its particles that are not `held` so that their weighted sum moves by `distance` along the normal.
@@ -276,8 +276,8 @@ impl ContactConstraint {
 
     /// Distance above the gap at `x`, `seconds` before the time the contact was detected for.
     pub(super) fn clearance(&self, x: &[DVec3], seconds: f64) -> f64 {
-        let offset = self.offset - self.normal.dot(&self.velocity) * seconds;
-        self.normal.dot(&self.weighted_sum(x)) - offset - self.gap
+        let offset = self.of.offset - self.normal.dot(&self.velocity) * seconds;
+        self.normal.dot(&self.weighted_sum(x)) - offset - self.of.gap
     }
 
     /// Depth at which the penalty acts, likewise.
@@ -288,7 +288,7 @@ impl ContactConstraint {
     /// For surfaces that penetrate each other at the start `x` of a step of `seconds`, limits the separation in that
     /// step to `separation` metres. Separated at once within a short step, they would fly apart.
     pub(super) fn depenetrating(self, x: &[DVec3], seconds: f64, separation: f64) -> Self {
-        let through = -self.clearance(x, seconds) - self.gap;
+        let through = -self.clearance(x, seconds) - self.of.gap;
         Self { allowed_depth: (through - separation).max(0.0), ..self }
     }
 
@@ -308,7 +308,7 @@ impl ContactConstraint {
         match then.mode {
             ContactMode::Open => depth <= 0.0,
             ContactMode::Frictionless => stays,
-            ContactMode::Sticking => stays && slip.norm() * then.grip <= self.friction * push.max(0.0),
+            ContactMode::Sticking => stays && slip.norm() * then.grip <= self.of.friction * push.max(0.0),
             ContactMode::Sliding => stays && slip.dot(&then.slip) >= SAME_DIRECTION * slip.norm(),
         }
     }
@@ -333,7 +333,7 @@ impl ContactConstraint {
             let dual = match then.mode {
                 ContactMode::Open | ContactMode::Frictionless => DVec3::zeros(),
                 ContactMode::Sticking => self.slip(v) * then.grip,
-                ContactMode::Sliding => then.slip * (self.friction * self.load),
+                ContactMode::Sliding => then.slip * (self.of.friction * self.load),
             };
             let force = if then.mode == ContactMode::Open { DVec3::zeros() } else { self.normal * push - dual };
             // Sliding friction does not depend on the slip, so it has no stiffness across it either.
@@ -347,7 +347,7 @@ impl ContactConstraint {
             state.force = self.normal * state.normal_force;
         }
         // The load is constant within a step; otherwise friction would start and stop with a jump.
-        let most = self.friction * self.load;
+        let most = self.of.friction * self.load;
         if most > 0.0 {
             let slip = self.slip(v);
             let (speed, creep) = (slip.norm(), self.creep(size));
@@ -369,7 +369,7 @@ impl ContactConstraint {
     /// new contact has no load yet. Where an obstacle moves so far that its plane at that time is unknown, a contact
     /// of a single point takes the last load.
     pub(super) fn with_load(&self, x: &[DVec3], loads: &[f64], seconds: f64) -> Self {
-        let near = self.velocity.norm() * seconds <= self.gap;
+        let near = self.velocity.norm() * seconds <= self.of.gap;
         let last = self.points().map(|(point, _)| loads[point]).fold(0.0, f64::max);
         let now = if near {
             self.load_at(x, seconds)
@@ -388,13 +388,13 @@ impl ContactConstraint {
         if depth <= 0.0 || self.gap_fraction(depth + self.allowed_depth) > 1.0 {
             return 0.0;
         }
-        let deepest = if self.gap > 0.0 { LINEAR_FROM * self.gap } else { f64::INFINITY };
+        let deepest = if self.of.gap > 0.0 { LINEAR_FROM * self.of.gap } else { f64::INFINITY };
         self.penalty(depth.min(deepest)).0
     }
 
     /// Normal force at a depth > 0, its derivative, and the stored energy.
     fn penalty(&self, depth: f64) -> (f64, f64, f64) {
-        let (k, gap) = (self.penalty_stiffness, self.gap);
+        let (k, gap) = (self.penalty_stiffness, self.of.gap);
         let edge = LINEAR_FROM * gap;
         if gap <= 0.0 {
             return (k * depth, k, 0.5 * k * depth * depth);
@@ -410,12 +410,12 @@ impl ContactConstraint {
     /// steep part of the penalty, Newton's method would only halve the excess in each iteration.
     pub(super) fn linearise(&self, state: &mut ContactState) {
         let expected = state.predicted;
-        if self.frozen.is_some() || state.depth <= 0.0 || self.gap <= 0.0 || expected >= state.normal_force {
+        if self.frozen.is_some() || state.depth <= 0.0 || self.of.gap <= 0.0 || expected >= state.normal_force {
             return;
         }
-        let left = self.penalty_stiffness / (self.penalty_stiffness + expected / self.gap);
+        let left = self.penalty_stiffness / (self.penalty_stiffness + expected / self.of.gap);
         let slope = self.penalty_stiffness / (left * left);
-        let push = expected + slope * (state.depth - self.gap * (1.0 - left));
+        let push = expected + slope * (state.depth - self.of.gap * (1.0 - left));
         (state.offset, state.normal_force, state.slope) = (push - state.normal_force, push, slope);
     }
 
@@ -439,7 +439,7 @@ impl ContactConstraint {
         let separation = self.weighted_sum(dx);
         let along = self.normal.dot(&separation);
         state.predicted = (state.normal_force - state.slope * share * along).max(0.0);
-        let (before, most) = (std::mem::take(&mut state.dual), self.friction * self.load);
+        let (before, most) = (std::mem::take(&mut state.dual), self.of.friction * self.load);
         if most <= 0.0 || state.mode == ContactMode::Open {
             return;
         }
@@ -455,12 +455,12 @@ impl ContactConstraint {
 
     /// Slip velocity above which friction is μN, m/s.
     fn creep(&self, size: f64) -> f64 {
-        (CREEP * size).max(f64::MIN_POSITIVE).max(self.friction * self.load / self.stick_limit)
+        (CREEP * size).max(f64::MIN_POSITIVE).max(self.of.friction * self.load / self.stick_limit)
     }
 
     /// Friction potential of the stage in which `v` = (x − z)/a.
     pub(super) fn friction_energy(&self, v: &[DVec3], a: f64, size: f64) -> f64 {
-        let most = self.friction * self.load;
+        let most = self.of.friction * self.load;
         let (speed, creep) = (self.slip(v).norm(), self.creep(size));
         let held = if speed <= creep { 0.5 * speed * speed / creep } else { speed - 0.5 * creep };
         a * most * held

@@ -11,6 +11,7 @@ use super::springs::distance;
 use super::stage::{Solved, Stage};
 use super::step::{Interval, Kinematics, StepEnd, Stepper, deepest, sum};
 use numerics::vector::DVec3;
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Rounds of contact detection in a step.
@@ -46,12 +47,12 @@ impl Stepper<'_> {
             particle_stiffness: &self.solver.particle_stiffness,
             heaps: &self.solver.heaps,
         };
-        let known = found.iter().filter_map(|contact| ContactConstraint::new(body, contact, &scale));
-        let known = known.map(|c| {
-            let displacement = spacing::least(body, &c) * h / self.seconds;
-            c.depenetrating(&start.x, h, displacement).with_load(&start.x, &start.loads, h)
-        });
-        let mut known: Vec<ContactConstraint> = known.collect();
+        let constraint = |contact: &Contact| {
+            let known = ContactConstraint::new(body, contact, &scale)?;
+            let displacement = spacing::least(body, &known) * h / self.seconds;
+            Some(known.depenetrating(&start.x, h, displacement).with_load(&start.x, &start.loads, h))
+        };
+        let mut known: Vec<ContactConstraint> = found.iter().filter_map(constraint).collect();
         // Contacts of the same points share the last loads.
         let asked = self.loads(&known, |contact| contact.load);
         for contact in known.iter_mut().filter(|contact| contact.load > 0.0) {
@@ -89,7 +90,7 @@ impl Stepper<'_> {
     pub(super) fn euler(&mut self, step: Interval<'_>, contacts: &mut Vec<ContactConstraint>, guess: Guess) -> StepEnd {
         let Interval { start, times, h } = step;
         let mut z = start.x.clone();
-        let y: Vec<DVec3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
+        let y = step.ahead();
         let mut x = match guess {
             Guess::Predicted => self.slid(&start.x, &y, contacts, h),
             Guess::Start => start.x.clone(),
@@ -107,8 +108,7 @@ impl Stepper<'_> {
             if let Some((y, gravity)) = &stopped {
                 (stage.y, stage.now.gravity) = (y, *gravity);
             }
-            let fell = if round > 1 { self.set_back(&start.x, contacts, &mut x) } else { true };
-            if fell {
+            if round == 1 || self.set_back(&start.x, contacts, &mut x) {
                 scale = self.scale(&stage, &start.x, contacts, h);
                 (solved.first, solved.enough) = (0.0, 0.0);
             }
@@ -118,7 +118,7 @@ impl Stepper<'_> {
             // Contacts that were deep before are being separated.
             let sank = |c: &&ContactConstraint| c.is_too_deep(&x) && c.clearance(&x, 0.0) < c.clearance(&start.x, h);
             solved.unmet = found.iter().filter(sank).map(|c| -c.clearance(&x, 0.0)).fold(0.0, f64::max);
-            solved.passed = found.iter().filter(sank).any(|c| -c.clearance(&x, 0.0) > c.gap);
+            solved.passed = found.iter().filter(sank).any(|c| -c.clearance(&x, 0.0) > c.of.gap);
             solved.deepest = deepest(&found, &x);
             if round == most_rounds || !missed {
                 break;
@@ -159,8 +159,7 @@ impl Stepper<'_> {
             near[body.layout.piece_of(particle)] = true;
         }
         let mut x = start.x.clone();
-        for (piece, _) in body.order.pieces.iter().zip(near).filter(|(_, near)| !near) {
-            let particles = body.particles(piece);
+        for (particles, _) in body.pieces().zip(near).filter(|(_, near)| !near) {
             if !particles.clone().any(|particle| self.solver.system.is_loose(particle)) {
                 let by = body.mean_by_mass(particles.clone(), &start.v) * h;
                 x[particles].iter_mut().for_each(|x| *x += by);
@@ -194,7 +193,7 @@ impl Stepper<'_> {
     /// it is more than `FAR`.
     fn far_below(&self, contacts: &[ContactConstraint], x: &[DVec3], by: DVec3) -> Vec<(Range<usize>, Option<DVec3>)> {
         let body = self.context.body;
-        let mut pieces: Vec<_> = body.order.pieces.iter().map(|piece| (body.particles(piece), None)).collect();
+        let mut pieces: Vec<_> = body.pieces().map(|piece| (piece, None)).collect();
         for contact in contacts.iter().filter(|contact| !contact.is_two_sided()) {
             let depth = -contact.clearance(x, 0.0) - contact.normal.dot(&by);
             let (_, way) = &mut pieces[body.layout.piece_of(contact.particles[0] as usize)];
@@ -208,10 +207,10 @@ impl Stepper<'_> {
     /// Sets pieces that fell more than `FAR` into an obstacle, which was not known yet, to where they `were`; returns whether
     /// there are any.
     fn set_back(&self, were: &[DVec3], contacts: &[ContactConstraint], x: &mut [DVec3]) -> bool {
-        let mut any = false;
-        let far = self.far_below(contacts, x, DVec3::zeros());
-        for (piece, _) in far.into_iter().filter(|piece| piece.1.is_some()) {
-            any = true;
+        let mut far = self.far_below(contacts, x, DVec3::zeros());
+        far.retain(|piece| piece.1.is_some());
+        let any = !far.is_empty();
+        for (piece, _) in far {
             for particle in piece.filter(|particle| !self.context.external.held[*particle]) {
                 x[particle] = were[particle];
             }
@@ -245,13 +244,12 @@ impl Stepper<'_> {
 fn take_loads(known: &[ContactConstraint], found: &mut [ContactConstraint]) {
     /// Cosine of the largest angle between similar normals.
     const SAME: f64 = 0.9;
-    let mut order: Vec<u32> = (0..known.len() as u32).collect();
-    order.sort_by_key(|index| (known[*index as usize].points, *index));
+    let mut by_points: BTreeMap<[u32; 4], Vec<&ContactConstraint>> = BTreeMap::new();
+    known.iter().for_each(|contact| by_points.entry(contact.of.points).or_default().push(contact));
     for contact in found {
-        let first = order.partition_point(|index| known[*index as usize].points < contact.points);
-        let mine = order[first..].iter().map(|index| &known[*index as usize]);
-        let alike = mine.take_while(|other| other.points == contact.points);
-        let nearest = alike.max_by(|a, b| a.normal.dot(&contact.normal).total_cmp(&b.normal.dot(&contact.normal)));
-        contact.load = nearest.filter(|other| other.normal.dot(&contact.normal) > SAME).map_or(0.0, |other| other.load);
+        let along = |other: &ContactConstraint| other.normal.dot(&contact.normal);
+        let alike = by_points.get(&contact.of.points).into_iter().flatten();
+        let nearest = alike.max_by(|a, b| along(a).total_cmp(&along(b)));
+        contact.load = nearest.filter(|other| along(other) > SAME).map_or(0.0, |other| other.load);
     }
 }

@@ -37,15 +37,15 @@ impl SoftBody {
         for tet in &self.given {
             sums[self.layout.piece_of(self.order.index_of[tet.corners[0] as usize] as usize)].1 += tet.filled();
         }
-        let of_piece = |(piece, (stiffness, volume)): (&std::ops::Range<usize>, (Matrix6<f64>, f64))| {
+        let of_piece = |(particles, (stiffness, volume)): (std::ops::Range<usize>, (Matrix6<f64>, f64))| {
             let compliance = (stiffness / volume).cholesky()?.inverse();
             // The stress that stretches along a unit vector d is d dᵀ.
             let moduli = directions().map(|d| 1.0 / products(d).dot(&(compliance * products(d))));
             let range = moduli.fold([f64::INFINITY, 0.0], |[low, high]: [f64; 2], e| [low.min(e), high.max(e)]);
-            let particle = self.order.caller_of[self.particles(piece).start];
+            let particle = self.order.caller_of[particles.start];
             range.iter().all(|modulus| modulus.is_finite()).then_some(DirectionalModulus { particle, range })
         };
-        self.order.pieces.iter().zip(sums).filter_map(of_piece).collect()
+        self.pieces().zip(sums).filter_map(of_piece).collect()
     }
 }
 

@@ -56,18 +56,10 @@ pub(super) struct ExternalForces<'a> {
     during: Option<&'a (dyn Fn(f64) -> Ambient + Sync)>,
     /// Length of the frame, seconds.
     seconds: f64,
-    /// The goal of each particle; empty without goals.
-    goals: Vec<Option<Track>>,
+    /// The goal of each particle, or the sum of several; empty without goals.
+    goals: Vec<Option<GoalSpring>>,
     pub(super) held: Vec<bool>,
-    pins: Vec<(u32, [DVec3; 2])>,
-}
-
-/// A goal, or the sum of several goals of one particle.
-#[derive(Clone, Copy, Debug)]
-struct Track {
-    between: [DVec3; 2],
-    strength: f64,
-    damping: f64,
+    pins: Vec<(u32, [[f64; 3]; 2])>,
 }
 
 impl<'a> ExternalForces<'a> {
@@ -83,20 +75,14 @@ impl<'a> ExternalForces<'a> {
         };
         for goal in goals.iter().filter(|goal| goal.strength > 0.0) {
             let particle = body.order.index_of[goal.particle as usize] as usize;
-            let track = Track {
-                between: goal.between.map(DVec3::from),
-                strength: goal.strength,
-                damping: goal.damping.max(0.0),
-            };
-            match &mut external.goals[particle] {
-                Some(known) => known.join(&track),
-                slot => *slot = Some(track),
-            }
+            let goal = GoalSpring { damping: goal.damping.max(0.0), ..*goal };
+            let slot = &mut external.goals[particle];
+            *slot = Some(slot.map_or(goal, |known| known.joined(&goal)));
         }
         for pin in pins {
             let particle = body.order.index_of[pin.particle as usize];
             if !std::mem::replace(&mut external.held[particle as usize], true) {
-                external.pins.push((particle, pin.between.map(DVec3::from)));
+                external.pins.push((particle, pin.between));
             }
         }
         external
@@ -111,7 +97,7 @@ impl<'a> ExternalForces<'a> {
     /// Whether gravity changes or a goal or pin moves between two `times`, fractions of the frame, so that it can do work
     /// that is not in the energies.
     pub(super) fn drives(&self, times: [f64; 2]) -> bool {
-        let moves = |between: &[DVec3; 2]| between[0] != between[1];
+        let moves = |between: &[[f64; 3]; 2]| between[0] != between[1];
         let [before, after] = times.map(|time| self.at(time).gravity);
         before != after
             || self.pins.iter().any(|pin| moves(&pin.1))
@@ -185,27 +171,29 @@ impl<'a> ExternalForces<'a> {
     }
 
     #[inline(always)]
-    fn goal(&self, particle: usize) -> Option<&Track> {
+    fn goal(&self, particle: usize) -> Option<&GoalSpring> {
         self.goals.get(particle)?.as_ref()
     }
 
-    fn velocity(&self, between: &[DVec3; 2]) -> DVec3 {
+    fn velocity(&self, between: &[[f64; 3]; 2]) -> DVec3 {
+        let between = between.map(DVec3::from);
         if self.seconds > 0.0 { (between[1] - between[0]) / self.seconds } else { DVec3::zeros() }
     }
 }
 
-impl Track {
-    fn join(&mut self, other: &Self) {
-        let strength = self.strength + other.strength;
+impl GoalSpring {
+    /// The sum of two goals of one particle.
+    fn joined(&self, other: &Self) -> Self {
+        let (strength, damping) = (self.strength + other.strength, self.damping + other.damping);
         let (mine, others) = (self.strength / strength, other.strength / strength);
-        self.between = std::array::from_fn(|end| self.between[end] * mine + other.between[end] * others);
-        self.strength = strength;
-        self.damping += other.damping;
+        let end = |end: usize| DVec3::from(self.between[end]) * mine + DVec3::from(other.between[end]) * others;
+        Self { between: [end(0).into(), end(1).into()], strength, damping, ..*self }
     }
 }
 
 /// Linear interpolation, exact at both ends.
 #[inline(always)]
-fn lerp(between: &[DVec3; 2], time: f64) -> DVec3 {
+fn lerp(between: &[[f64; 3]; 2], time: f64) -> DVec3 {
+    let between = between.map(DVec3::from);
     if time >= 1.0 { between[1] } else { between[0] + (between[1] - between[0]) * time }
 }

@@ -8,9 +8,8 @@ use super::heap::heaps;
 use super::springs::{self, RestLengths};
 use super::stage::{BodySolver, FrameContext};
 use super::state::State;
-use super::step::{Kinematics, Stepped, Stepper};
+use super::step::{Interval, Kinematics, Stepped, Stepper};
 use super::volume::{Inventory, Volumes};
-use numerics::vector::DVec3;
 
 /// Largest number of steps in a frame, and of parts into which a step is cut at once.
 const MOST_STEPS: u32 = 256;
@@ -167,7 +166,8 @@ impl BodySolver {
         self.system.regions.idle = self.volumes.is_disabled();
         springs::particle_stiffness(body, &rest, &mut self.particle_stiffness);
         self.heaps = heaps(body, external.at(1.0).gravity);
-        self.system.set_loose(&external.held, &self.particle_stiffness);
+        self.system.held.clone_from(&external.held);
+        self.system.isolated = self.particle_stiffness.iter().map(|k| *k == 0.0).collect();
         let context =
             FrameContext { body, external: &external, rest, volumes: &state.volumes, cancelled: frame.cancelled };
         state.acceleration.resize(body.len(), [0.0; 3]);
@@ -239,13 +239,14 @@ impl Stepper<'_> {
         const SHORT: f64 = 1.0 / 16.0;
         let share = times[1] - times[0];
         let shortest = share * f64::from(MOST_STEPS) < 2.0;
-        let turns = self.least_steps(motion, times);
+        let step = Interval { start: motion, times, h: share * self.seconds };
+        let turns = self.least_steps(step);
         if turns > 1 && self.frame.substeps == 0 && !shortest {
             return self.advance_in(turns.min((share * f64::from(MOST_STEPS)) as u32), motion, times, deepest);
         }
         self.report.fast_turns += u32::from(turns > 1);
         let turned = self.solver.inventory.inverted > 0;
-        let (mut end, mut stepped) = self.step(motion, times);
+        let (mut end, mut stepped) = self.step(step);
         self.report.newton += stepped.solved.newton;
         self.report.cg += stepped.solved.cg;
         let unmet = stepped.solved.unmet;
@@ -264,9 +265,9 @@ impl Stepper<'_> {
         let is_over = self.is_spent() && !missed || shortest;
         if self.frame.substeps > 0 || (self.frame.cancelled)() || is_over || parts < 2 {
             self.report.uncut_impacts += u32::from(wanted > 1 && !shortest);
-            self.report.tolerance_missed += u32::from(stepped.estimate > allowed);
+            self.report.tolerance_missed += u32::from(stepped.report.error_estimate > allowed);
             if unmet > 0.0 {
-                self.keep_sides(motion, times, &mut end, &mut stepped);
+                self.keep_sides(step, &mut end, &mut stepped);
             }
             *motion = end;
             return self.accept(&stepped);
@@ -285,13 +286,11 @@ impl Stepper<'_> {
         self.frame.substeps == 0 && self.report.newton >= MOST_NEWTON[usize::from(self.tolerance.is_some())]
     }
 
-    /// The number of parts that a step between `times` has to be cut into because of obstacles that turn.
-    fn least_steps(&self, start: &Kinematics, times: [f64; 2]) -> u32 {
+    /// The number of parts that a step has to be cut into because of obstacles that turn.
+    fn least_steps(&self, step: Interval<'_>) -> u32 {
         let Some(contacts) = self.frame.contacts else { return 1 };
-        let h = (times[1] - times[0]) * self.seconds;
-        let ahead: Vec<DVec3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
-        let [from, to] = [&start.x, &ahead].map(|x| self.context.body.contact_points(x));
-        contacts.least_steps(&ContactQuery { from: &from, to: &to, times })
+        let [from, to] = [&step.start.x, &step.ahead()].map(|x| self.context.body.contact_points(x));
+        contacts.least_steps(&ContactQuery { from: &from, to: &to, times: step.times })
     }
 
     /// The number of parts that a step has to be cut into so that an impact keeps its bounce, and how many of them the
@@ -308,7 +307,7 @@ impl Stepper<'_> {
         let crushed = self.energies.scale() > CRUSHED * self.context.body.modulus_times_volume();
         let bounces = frame.integrator == Integrator::Default
             && frame.bounce.is_none_or(|bounce| bounce > 0.0 && bounce.is_finite())
-            && !(frame.substeps > 0 || frame.force_implicit_euler || turned || crushed || stepped.jammed > 0);
+            && !(frame.substeps > 0 || frame.force_implicit_euler || turned || crushed || stepped.report.jammed > 0);
         let wanted = if bounces { (stepped.impact_error / IMPACT_ERROR).clamp(1.0, MOST_PARTS) } else { 1.0 };
         let wanted = (wanted.ceil() as u32).next_power_of_two();
         // As if a part cost what the whole did.
@@ -323,14 +322,15 @@ impl Stepper<'_> {
         self.energies = stepped.after;
         report.caps_hit += stepped.solved.caps + u32::from(stepped.solved.unmet > 0.0);
         report.residual = report.residual.max(stepped.solved.residual);
-        report.error_estimate += stepped.estimate;
-        report.energy_removed += stepped.energy_removed;
-        report.energy_lost += stepped.energy_lost;
+        report.error_estimate += stepped.report.error_estimate;
+        report.energy_removed += stepped.report.energy_removed;
+        report.energy_lost += stepped.report.energy_lost;
         report.substeps += 1;
-        report.euler_steps += u32::from(stepped.euler);
-        report.stopped = report.stopped.max(stepped.stopped);
-        (report.contacts, report.deepest_overlap) = (stepped.contacts, report.deepest_overlap.max(stepped.overlap));
-        report.jammed = report.jammed.max(stepped.jammed);
+        report.euler_steps += stepped.report.euler_steps;
+        report.stopped = report.stopped.max(stepped.report.stopped);
+        report.contacts = stepped.report.contacts;
+        report.deepest_overlap = report.deepest_overlap.max(stepped.report.deepest_overlap);
+        report.jammed = report.jammed.max(stepped.report.jammed);
     }
 }
 
@@ -338,13 +338,14 @@ impl Stepper<'_> {
 fn accurate_parts(stepped: &Stepped, allowed: f64) -> u32 {
     /// Safety factor.
     const RESERVE: f64 = 0.9;
-    if stepped.estimate <= allowed {
+    let Stepped { report: FrameReport { error_estimate, euler_steps, .. }, .. } = *stepped;
+    if error_estimate <= allowed {
         return 1;
     }
     // The estimate ÷ step size is proportional to the step size for a first-order method, to its square for a second-order
     // one.
-    let ratio = stepped.estimate / allowed;
-    let ratio = if stepped.euler { ratio } else { ratio.sqrt() };
+    let ratio = error_estimate / allowed;
+    let ratio = if euler_steps > 0 { ratio } else { ratio.sqrt() };
     (ratio / RESERVE).ceil().clamp(2.0, MOST_PARTS) as u32
 }
 

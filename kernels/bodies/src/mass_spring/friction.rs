@@ -85,7 +85,7 @@ impl BodySolver {
     pub(super) fn balance(&self, stage: &Stage<'_>, x: &[DVec3]) -> LoadBalance {
         let body = stage.context.body;
         let mut pieces = vec![PieceLoads::default(); body.order.pieces.len()];
-        for contact in stage.contacts.iter().filter(|contact| contact.friction > 0.0) {
+        for contact in stage.contacts.iter().filter(|contact| contact.of.friction > 0.0) {
             let now = contact.load_at(x, 0.0);
             let mut last = usize::MAX;
             for (particle, weight) in contact.sides() {
@@ -105,9 +105,7 @@ impl BodySolver {
             return balance;
         }
         let left: Vec<DVec3> = self.r.iter().zip(&body.mass).map(|(r, mass)| r / (stage.a * stage.a * mass)).collect();
-        for (piece, loads) in
-            body.order.pieces.iter().zip(&pieces).filter(|piece| piece.1.single > 0.0 || piece.1.sum > 0.0)
-        {
+        for (piece, loads) in body.pieces().zip(&pieces).filter(|piece| piece.1.single > 0.0 || piece.1.sum > 0.0) {
             let pressed = 1.0 + (PRESSED - 1.0) * (1.0 - (loads.net.norm() / loads.sum).min(1.0));
             let motion = RigidMotion::new(body, &self.system.held, piece, [x, &left, &left]);
             let left = if loads.sum > 0.0 { motion.force(body) / (loads.sum * pressed) } else { 0.0 };
@@ -150,7 +148,7 @@ mod tests {
         let left: Vec<DVec3> = body.rest.iter().zip(&body.mass).map(|(x, mass)| forces(x) / *mass).collect();
         let r: Vec<Quad> = body.rest.iter().map(|x| Quad::new(forces(x) * (a * a))).collect();
         let held = vec![false; body.len()];
-        let motion = RigidMotion::new(&body, &held, &body.order.pieces[0], [&body.rest, &left, &left]);
+        let motion = RigidMotion::new(&body, &held, 0..body.len(), [&body.rest, &left, &left]);
         let force = motion.force(&body);
         assert!((motion.force_left(&body.rest, &r) / (a * a * force) - 1.0).abs() < 1e-9);
         for (loads, holds) in [(1.01, true), (0.99, false)] {

@@ -10,6 +10,7 @@ use numerics::quad::Quad;
 use numerics::rank_one::{RankOneTerms, add_square};
 use numerics::simd::{Path, kernel};
 use numerics::vector::{DMat3, DVec3};
+use std::collections::BTreeMap;
 
 /// Contacts between bodies are left out where they make factoring more than this many times as dear.
 const DEARER: f64 = 8.0;
@@ -120,17 +121,16 @@ impl Galerkin<'_> {
     /// Adds rank-one terms, those before `end`.
     fn add_rank_one_terms(&self, rows: &RankOneTerms, end: usize, matrix: &mut EnvelopeMatrix) {
         let Some(partition) = rows.partition() else { return };
-        let of_part = |part, ()| -> Vec<Vec<Coupling>> {
+        let of_part = |part, ()| -> Vec<BTreeMap<usize, [f64; MODES]>> {
             partition.range(part).filter(|row| *row < end).map(|row| self.couplings(rows, row)).collect()
         };
-        let each = partition.map((), of_part);
-        for couplings in each.iter().flatten() {
-            for near in couplings {
-                for far in couplings.iter().filter(|far| far.cluster <= near.cluster) {
-                    for (i, push) in near.along.iter().enumerate() {
-                        let count = if far.cluster == near.cluster { i + 1 } else { MODES };
-                        for (j, other) in far.along[..count].iter().enumerate() {
-                            matrix.add(MODES * near.cluster + i, MODES * far.cluster + j, push * other);
+        for couplings in partition.map((), of_part).iter().flatten() {
+            for (near, pushes) in couplings {
+                for (far, others) in couplings.range(..=near) {
+                    for (i, push) in pushes.iter().enumerate() {
+                        let count = if far == near { i + 1 } else { MODES };
+                        for (j, other) in others[..count].iter().enumerate() {
+                            matrix.add(MODES * near + i, MODES * far + j, push * other);
                         }
                     }
                 }
@@ -140,9 +140,9 @@ impl Galerkin<'_> {
 
     /// Change of a rank-one term by the rigid motions of each cluster. Empty if all its particles are in one cluster
     /// and unfiltered, since rigid motions change neither volumes nor gaps.
-    fn couplings(&self, rows: &RankOneTerms, row: usize) -> Vec<Coupling> {
+    fn couplings(&self, rows: &RankOneTerms, row: usize) -> BTreeMap<usize, [f64; MODES]> {
         let Self { body, system, motions } = self;
-        let mut couplings: Vec<Coupling> = Vec::new();
+        let mut couplings = BTreeMap::new();
         let home = |particle: usize| body.layout.cluster[particle] as usize;
         let mut entries = rows.entries(row).peekable();
         let first = entries.peek().map(|entry| home(entry.0));
@@ -151,12 +151,8 @@ impl Galerkin<'_> {
             return couplings;
         }
         for (particle, g) in rows.entries(row).filter(|(particle, _)| !system.held[*particle]) {
-            let cluster = home(particle);
-            let at = couplings.iter().position(|known| known.cluster == cluster).unwrap_or_else(|| {
-                couplings.push(Coupling { cluster, along: [0.0; MODES] });
-                couplings.len() - 1
-            });
-            couplings[at].along.iter_mut().zip(self.along(particle, g)).for_each(|(sum, along)| *sum += along);
+            let sums = couplings.entry(home(particle)).or_insert([0.0; MODES]);
+            sums.iter_mut().zip(self.along(particle, g)).for_each(|(sum, along)| *sum += along);
         }
         couplings
     }
@@ -175,15 +171,8 @@ pub(super) fn envelope(layout: &Layout, system: &System) -> (usize, Vec<u32>) {
         let widths = first.iter().enumerate().map(|(cluster, first)| (cluster + 1 - *first as usize) as f64);
         (widths.map(|width| width * width).sum::<f64>(), (rows, first))
     };
-    let count = if system.transient.is_empty() { 0 } else { system.transient.len() };
-    let (anchors, all) = (joined(system.anchors.min(count)), joined(count));
+    let (anchors, all) = (joined(system.anchors), joined(system.transient.len()));
     if all.0 <= f64::max(DEARER * anchors.0, CHEAP) { all.1 } else { anchors.1 }
-}
-
-/// Change of a rank-one term by the rigid motions of one cluster.
-struct Coupling {
-    cluster: usize,
-    along: [f64; MODES],
 }
 
 /// The directions in which a spring has stiffness, each with that stiffness.
@@ -204,17 +193,11 @@ fn write(blocks: &[Block], out: &mut [f64]) {
     }
 }
 
-/// The cross product matrix −r×, which maps a rotation vector to the displacement at `r`.
-#[inline(always)]
-fn turn(r: DVec3) -> DMat3 {
-    DMat3::new(0.0, r.z, -r.y, -r.z, 0.0, r.x, r.y, -r.x, 0.0)
-}
-
 /// Displacement at `offset` for translations and rotations, filtered.
 #[inline(always)]
 fn motion(filter: Option<DMat3>, offset: DVec3) -> [DMat3; 2] {
     let shift = filter.unwrap_or_else(DMat3::identity);
-    [shift, shift * turn(offset)]
+    [shift, shift * offset.cross_matrix().transpose()]
 }
 
 /// Coupling of the rigid motions of two clusters.

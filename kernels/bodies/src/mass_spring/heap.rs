@@ -39,13 +39,12 @@ impl ContactScale<'_> {
 
 /// Whether each particle is of a heap under `gravity`, m/s²; empty if none is.
 pub(super) fn heaps(body: &SoftBody, gravity: DVec3) -> Vec<bool> {
-    let ratios = body.stiffness_to_weights(gravity);
-    if !ratios.iter().any(|ratio| *ratio < HEAP) {
-        return Vec::new();
-    }
-    let mut heaps = vec![false; body.len()];
-    for (piece, ratio) in body.order.pieces.iter().zip(ratios) {
-        heaps[body.particles(piece)].fill(ratio < HEAP);
+    let mut heaps = Vec::new();
+    for (piece, ratio) in body.pieces().zip(body.stiffness_to_weights(gravity)) {
+        if ratio < HEAP {
+            heaps.resize(body.len(), false);
+            heaps[piece].fill(true);
+        }
     }
     heaps
 }

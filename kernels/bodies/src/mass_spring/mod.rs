@@ -51,6 +51,7 @@ mod volume;
 
 pub use body::{BodyError, BodySpring, LIGHTEST, Material, Mesh, SHORTEST, SoftBody};
 pub use contact::Contact;
+pub(crate) use contact::Weighted;
 pub use evenness::DirectionalModulus;
 pub use external::{Ambient, GoalSpring, Pin};
 pub use finder::{ContactFinder, ContactQuery};

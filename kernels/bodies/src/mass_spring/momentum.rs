@@ -80,7 +80,7 @@ impl BodySolver {
                 Some(ObstacleContact {
                     group,
                     contact: index,
-                    weight: contact.point_weights.iter().sum(),
+                    weight: contact.of.weights.iter().sum(),
                     directions: contact.stiffness_directions(state, stage.a).collect(),
                 })
             });
@@ -180,7 +180,6 @@ impl BodySolver {
 
 /// The particles of groups, with the group.
 fn members(body: &SoftBody, groups: &[Option<u32>]) -> impl Iterator<Item = (usize, usize)> {
-    let grouped = body.order.pieces.iter().zip(groups);
-    let grouped = grouped.filter_map(|(piece, group)| Some(((*group)? as usize, piece)));
-    grouped.flat_map(|(group, piece)| body.particles(piece).map(move |particle| (group, particle)))
+    let grouped = body.pieces().zip(groups).filter_map(|(piece, group)| Some(((*group)? as usize, piece)));
+    grouped.flat_map(|(group, piece)| piece.map(move |particle| (group, particle)))
 }

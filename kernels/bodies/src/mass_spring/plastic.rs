@@ -109,6 +109,8 @@ fn elastic(body: &SoftBody, state: &State) -> f64 {
     let lengths = state.rest_lengths();
     let rest = RestLengths { lengths: &lengths, torn: &state.torn };
     let x = body.to_solver_order(&state.positions);
-    body.spring_partition
-        .sum((), |part, ()| body.spring_partition.range(part).map(|at| springs::energy(body, &rest, &x, at)).sum())
+    body.spring_partition.sum((), |part, ()| {
+        let intact = body.spring_partition.range(part).filter(|at| rest.is_intact(*at as u32));
+        intact.map(|at| springs::stored(body, &rest, at, springs::spring_length(body, &x, at))).sum()
+    })
 }

@@ -31,9 +31,9 @@ pub(super) struct RigidMotion {
 }
 
 impl RigidMotion {
-    /// The rigid motion with the momenta of a piece, by positions, velocities and accelerations of particles; at rest if it has particles that are `held`.
-    pub(super) fn new(body: &SoftBody, held: &[bool], piece: &Range<usize>, motion: [&[DVec3]; 3]) -> Self {
-        let particles = body.particles(piece);
+    /// The rigid motion with the momenta of the `particles` of a piece, by positions, velocities and accelerations; at rest if
+    /// some of them are `held`.
+    pub(super) fn new(body: &SoftBody, held: &[bool], particles: Range<usize>, motion: [&[DVec3]; 3]) -> Self {
         let still = Self { particles: particles.clone(), ..Self::default() };
         if held[particles.clone()].contains(&true) {
             return still;
@@ -131,9 +131,9 @@ impl<'a> Predictor<'a> {
     /// From positions, velocities and the accelerations measured over the last step of `before` seconds. Pieces with
     /// `loose` particles are not treated as rigid.
     pub(super) fn new(body: &'a SoftBody, loose: &[bool], motion: [&'a [DVec3]; 3], before: f64) -> Self {
-        let rigid = |piece: &Range<usize>| RigidMotion::new(body, loose, piece, motion);
+        let pieces = body.pieces().map(|piece| RigidMotion::new(body, loose, piece, motion)).collect();
         let [x, v, acceleration] = motion;
-        Self { body, pieces: body.order.pieces.iter().map(rigid).collect(), x, v, acceleration, before }
+        Self { body, pieces, x, v, acceleration, before }
     }
 
     /// Kinetic energy of rotation of each piece, joules.

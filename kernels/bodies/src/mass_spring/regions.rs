@@ -8,7 +8,7 @@
 //! barrier against inversion resist.
 
 use crate::tets::oriented_boundary;
-use numerics::cluster_order::split;
+use numerics::cluster_order::CompactSets;
 use numerics::partition::Partition;
 use numerics::pieces::pieces;
 use numerics::quad::Quad;
@@ -22,17 +22,14 @@ const TETS: usize = 48;
 /// Regions and their closed boundary surfaces.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Regions {
-    /// Tetrahedra by region: start of each region's.
-    tet_starts: Vec<u32>,
-    tets: Vec<u32>,
+    /// Tetrahedra of each region.
+    tets: Vec<Vec<u32>>,
     /// Start of each region's entries in `particles`.
     pub(super) starts: Vec<u32>,
     /// Particles on the boundary of each region.
     pub(super) particles: Vec<u32>,
-    /// Start of each region's faces.
-    face_starts: Vec<u32>,
-    /// Boundary faces, outwards, as indices into the region's own particles.
-    faces: Vec<[u16; 3]>,
+    /// Boundary faces of each region, outwards, as indices into its own particles.
+    faces: Vec<Vec<[u16; 3]>>,
     /// For each region the sum of E·V at rest over its tetrahedra, joules, and its β, seconds.
     pub(super) energy: Vec<f64>,
     pub(super) damping: Vec<f64>,
@@ -45,28 +42,19 @@ impl Regions {
             tets.iter().map(|tet| tet.iter().map(|c| rest[*c as usize]).sum::<DVec3>() * 0.25).collect();
         let joined = tets.iter().flat_map(|[a, b, c, d]| [[*a, *b], [*a, *c], [*a, *d]]);
         let piece = pieces(rest.len(), joined);
-        let piece_of = |tet: &u32| piece[tets[*tet as usize][0] as usize];
-        let mut members: Vec<u32> = (0..tets.len() as u32).collect();
-        members.sort_by_key(|tet| (piece_of(tet), *tet));
-        let mut tet_starts = vec![0];
-        let mut first = 0;
-        while first < members.len() {
-            let count = members[first..].iter().take_while(|tet| piece_of(tet) == piece_of(&members[first])).count();
-            halve(&centres, &mut members[first..first + count], count.div_ceil(TETS), first, &mut tet_starts);
-            first += count;
-        }
-        let mut regions = Self { tet_starts, tets: members, starts: vec![0], face_starts: vec![0], ..Self::default() };
-        for region in 0..regions.tet_starts.len() - 1 {
-            let mine = regions.tet_starts[region] as usize..regions.tet_starts[region + 1] as usize;
-            let faces = oriented_boundary(regions.tets[mine].iter().map(|tet| tets[*tet as usize]));
+        let roots: Vec<u32> = tets.iter().map(|tet| piece[tet[0] as usize]).collect();
+        let sets = CompactSets::new(&centres, &roots, usize::MAX, |count| count.div_ceil(TETS));
+        let members = sets.starts.windows(2).map(|ends| sets.items[ends[0]..ends[1]].to_vec());
+        let mut regions = Self { tets: members.collect(), starts: vec![0], ..Self::default() };
+        for region in 0..regions.tets.len() {
+            let faces = oriented_boundary(regions.tets[region].iter().map(|tet| tets[*tet as usize]));
             let mut corners: Vec<u32> = faces.iter().flatten().copied().collect();
             corners.sort_unstable();
             corners.dedup();
             let local = |corner: u32| corners.partition_point(|known| *known < corner) as u16;
-            regions.faces.extend(faces.iter().map(|face| face.map(local)));
+            regions.faces.push(faces.iter().map(|face| face.map(local)).collect());
             regions.particles.extend(&corners);
             regions.starts.push(regions.particles.len() as u32);
-            regions.face_starts.push(regions.faces.len() as u32);
         }
         regions
     }
@@ -83,8 +71,7 @@ impl Regions {
 
     /// Sums of `values`, one for each tetrahedron, over each region.
     pub(super) fn sums(&self, values: impl Fn(usize) -> f64) -> Vec<f64> {
-        let members = |ends: &[u32]| &self.tets[ends[0] as usize..ends[1] as usize];
-        self.tet_starts.windows(2).map(|ends| members(ends).iter().map(|tet| values(*tet as usize)).sum()).collect()
+        self.tets.iter().map(|tets| tets.iter().map(|tet| values(*tet as usize)).sum()).collect()
     }
 
     /// Sets volume, E and β of the tetrahedra.
@@ -97,8 +84,7 @@ impl Regions {
     /// The boundary triangles of a region, outwards.
     pub(super) fn around(&self, region: usize) -> impl Iterator<Item = [u32; 3]> {
         let corners = self.of(region);
-        let faces = &self.faces[self.face_starts[region] as usize..self.face_starts[region + 1] as usize];
-        faces.iter().map(|face| face.map(|corner| corners[usize::from(corner)]))
+        self.faces[region].iter().map(|face| face.map(|corner| corners[usize::from(corner)]))
     }
 
     /// The particles on the boundary of a region.
@@ -115,10 +101,9 @@ impl Regions {
         corners: &mut Vec<[Quad; 2]>,
         gradient: &mut [DVec3],
     ) -> f64 {
-        let faces = &self.faces[self.face_starts[region] as usize..self.face_starts[region + 1] as usize];
         corners.clear();
         corners.extend(self.of(region).iter().map(|corner| [Quad::new(x[*corner as usize]), Quad::default()]));
-        measure(Path::chosen(), faces, corners, gradient)
+        measure(Path::chosen(), &self.faces[region], corners, gradient)
     }
 }
 
@@ -147,20 +132,6 @@ fn measure_body(faces: &[[u16; 3]], corners: &mut [[Quad; 2]], gradient: &mut [D
         volume += part.dot(&(*at - origin).xyz());
     }
     volume / 3.0
-}
-
-/// Recursive median splits along the longest side, as for clusters of particles.
-fn halve(centres: &[DVec3], tets: &mut [u32], regions: usize, base: usize, starts: &mut Vec<u32>) {
-    if regions <= 1 {
-        tets.sort_unstable();
-        starts.push((base + tets.len()) as u32);
-        return;
-    }
-    let middle = tets.len() * (regions / 2) / regions;
-    split(centres, tets, middle);
-    let (left, right) = tets.split_at_mut(middle);
-    halve(centres, left, regions / 2, base, starts);
-    halve(centres, right, regions - regions / 2, base + middle, starts);
 }
 
 #[cfg(test)]

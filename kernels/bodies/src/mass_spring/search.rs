@@ -160,8 +160,7 @@ impl BodySolver {
     /// tetrahedra may have become thin by that.
     fn add_moves(&self, body: &SoftBody, share: f64, moved: &mut [f64]) -> bool {
         let mut any = false;
-        for (piece, moved) in body.order.pieces.iter().zip(moved) {
-            let particles = body.particles(piece);
+        for (particles, moved) in body.pieces().zip(moved) {
             *moved += share * self.dx[particles.clone()].iter().map(|d| d.amax()).fold(0.0, f64::max);
             any |= *moved > THINNING * body.spacing[particles.start];
         }

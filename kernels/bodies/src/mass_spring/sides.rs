@@ -6,7 +6,7 @@
 
 use super::contact::ContactConstraint;
 use super::energy::measure;
-use super::step::{Interval, Kinematics, Stepped, Stepper, kinetic};
+use super::step::{self, Interval, Kinematics, Stepped, Stepper};
 use numerics::vector::DVec3;
 
 /// Depth, in gaps, at which a contact that was too deep is left.
@@ -16,29 +16,22 @@ const ROUNDS: u32 = 4;
 const TURNS: u32 = 8;
 
 impl Stepper<'_> {
-    /// Changes the `end` of a step from `start` so that contacts with open obstacles and the ground that were not too deep at its start
-    /// are not at its end.
-    pub(super) fn keep_sides(
-        &mut self,
-        start: &Kinematics,
-        times: [f64; 2],
-        end: &mut Kinematics,
-        stepped: &mut Stepped,
-    ) {
-        let h = (times[1] - times[0]) * self.seconds;
-        let step = Interval { start, times, h };
+    /// Changes the `end` of a step so that contacts with open obstacles and the ground that were not too deep at its start are
+    /// not at its end.
+    pub(super) fn keep_sides(&mut self, step: Interval<'_>, end: &mut Kinematics, stepped: &mut Stepped) {
+        let Interval { start, times, h } = step;
         let (mass, held) = (&self.context.body.mass, self.context.external.held.clone());
         let mut met: Vec<ContactConstraint> = Vec::new();
         for _ in 0..ROUNDS {
             let mut found = self.contacts(step, &end.x);
-            found.retain(|contact| contact.open);
+            found.retain(|contact| contact.of.open);
             let mut moved = vec![false; found.len()];
             for _ in 0..TURNS {
                 let mut any = false;
                 for (contact, moved) in found.iter().zip(&mut moved) {
                     let (before, now) = (contact.clearance(&start.x, h), contact.clearance(&end.x, 0.0));
                     if contact.is_too_deep(&end.x) && now < before {
-                        let missing = before.min(-LEFT * contact.gap) - now;
+                        let missing = before.min(-LEFT * contact.of.gap) - now;
                         *moved |= impel(contact, missing, (mass, &held), &mut end.x);
                         any |= *moved;
                     }
@@ -68,19 +61,14 @@ impl Stepper<'_> {
         self.solver.latest_inventory = None;
         self.refresh_inventory(&end.x);
         stepped.after = measure(self.solver, &self.context, times[1], [&end.x, &end.v], false);
-        self.take_energy(stepped.after.sum() - before, &held, end, stepped);
-        stepped.energy_lost += before - stepped.after.sum();
-    }
-
-    /// Slows what is not held by the energy `gained` when particles were moved back, joules.
-    fn take_energy(&self, gained: f64, held: &[bool], end: &mut Kinematics, stepped: &mut Stepped) {
-        let before = stepped.after.kinetic;
-        if !(gained > 0.0 && before > 0.0) {
-            return;
+        // What it gained by that is taken from the motion.
+        let (gained, kinetic) = (stepped.after.sum() - before, stepped.after.kinetic);
+        if gained > 0.0 && kinetic > 0.0 {
+            let keep = ((kinetic - gained) / kinetic).max(0.0).sqrt();
+            end.v.iter_mut().zip(&held).filter(|(_, held)| !**held).for_each(|(v, _)| *v *= keep);
+            stepped.after.kinetic = step::kinetic(self.context.body, &end.v);
         }
-        let keep = ((before - gained) / before).max(0.0).sqrt();
-        end.v.iter_mut().zip(held).filter(|(_, held)| !**held).for_each(|(v, _)| *v *= keep);
-        stepped.after.kinetic = kinetic(self.context.body, &end.v);
+        stepped.report.energy_lost += before - stepped.after.sum();
     }
 }
 

@@ -353,13 +353,7 @@ fn linearise_body(
     sums.iter_mut().zip(pulls).for_each(|(sums, pull)| *sums = pull.sums());
 }
 
-/// Elastic energy of spring `at`, joules.
-#[inline(always)]
-pub(super) fn energy(body: &SoftBody, rest: &RestLengths<'_>, x: &[DVec3], at: usize) -> f64 {
-    if rest.is_intact(at as u32) { stored(body, rest, at, spring_length(body, x, at)) } else { 0.0 }
-}
-
-/// The same of an intact spring with this length.
+/// Elastic energy of an intact spring with this length, joules.
 #[inline(always)]
 pub(super) fn stored(body: &SoftBody, rest: &RestLengths<'_>, at: usize, length: f64) -> f64 {
     let strain = length - rest.lengths[at];
@@ -391,12 +385,8 @@ pub(super) fn drift(x: &[DVec3], v: &[DVec3], a: usize, b: usize) -> [f64; 2] {
 
 kernel! {
     /// Potential within a stage of the springs listed at `particles`, each counted once, and of their dashpots, joules.
-    pub(super) fn potential(
-        adjacency: &Adjacency,
-        links: &[Link],
-        x: &[DVec3],
-        particles: Range<usize>,
-    ) -> f64 = potential_body;
+    pub(super) fn potential(adjacency: &Adjacency, links: &[Link], x: &[DVec3], particles: Range<usize>) -> f64
+        = potential_body;
 }
 
 #[inline(always)]

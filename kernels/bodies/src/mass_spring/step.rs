@@ -10,6 +10,7 @@
 //! would rebound 1.4 times as fast, since a second-order method extrapolates forces. The same holds for a step in
 //! which contacts change or that failed; it is repeated from its start.
 
+use super::balance::TakenStep;
 use super::body::SoftBody;
 use super::contact::{ContactConstraint, ContactMode};
 use super::energy::{Energies, measure};
@@ -50,6 +51,13 @@ pub(super) struct Interval<'a> {
     pub(super) h: f64,
 }
 
+impl Interval<'_> {
+    /// Where particles would be at its end without forces.
+    pub(super) fn ahead(&self) -> Vec<DVec3> {
+        self.start.x.iter().zip(&self.start.v).map(|(x, v)| x + v * self.h).collect()
+    }
+}
+
 /// The end of a step, or of a stage, which has no errors.
 pub(super) struct StepEnd {
     pub(super) x: Vec<DVec3>,
@@ -63,22 +71,13 @@ pub(super) struct StepEnd {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stepped {
     pub(super) solved: Solved,
-    /// Largest estimated error of a particle, metres.
-    pub(super) estimate: f64,
     /// Estimated error of the speed of a piece in contact, relative to what its energy amounts to.
     pub(super) impact_error: f64,
-    pub(super) euler: bool,
-    /// Energy removed to prevent a spurious gain, joules.
-    pub(super) energy_removed: f64,
-    /// Energy lost without damping, drag or friction, joules, and gained without external driving, which slowing the motion
-    /// could not take.
-    pub(super) energy_lost: f64,
+    /// Energy gained without external driving, which slowing the motion could not take, joules.
     pub(super) energy_gained: f64,
     pub(super) after: Energies,
-    pub(super) contacts: u32,
-    pub(super) overlap: f64,
-    pub(super) jammed: u32,
-    pub(super) stopped: u32,
+    /// What is reported if it is accepted.
+    pub(super) report: FrameReport,
 }
 
 /// What steps work with.
@@ -96,28 +95,24 @@ pub(super) struct Stepper<'a> {
 }
 
 impl Stepper<'_> {
-    /// Steps from `start` between two `times`, as fractions of the frame. From the predicted positions of a crumpled body a descent
-    /// may end in another valley of its energy, so high that no motion is left to slow. Then the step is repeated from where
-    /// the body is.
-    pub(super) fn step(&mut self, start: &Kinematics, times: [f64; 2]) -> (Kinematics, Stepped) {
-        let first = self.step_once(start, times, false);
+    /// Takes a step. From the predicted positions of a crumpled body a descent may end in another valley of its energy, so high
+    /// that no motion is left to slow. Then the step is repeated from where the body is.
+    pub(super) fn step(&mut self, step: Interval<'_>) -> (Kinematics, Stepped) {
+        let first = self.step_once(step, false);
         let unpaid = first.1.energy_gained > UNPAID * self.energies.scale().max(first.1.after.scale());
         if !unpaid {
             return first;
         }
-        self.refresh_inventory(&start.x);
-        let (motion, stepped) = self.step_once(start, times, true);
+        self.refresh_inventory(&step.start.x);
+        let (motion, stepped) = self.step_once(step, true);
         (motion, Stepped { solved: repeated(first.1.solved, stepped.solved), ..stepped })
     }
 
     /// A step; with implicit Euler from where bodies are if they are to be `moved_on`.
-    fn step_once(&mut self, start: &Kinematics, times: [f64; 2], moved_on: bool) -> (Kinematics, Stepped) {
-        let before = &{ self.energies };
-        let h = (times[1] - times[0]) * self.seconds;
-        let step = Interval { start, times, h };
+    fn step_once(&mut self, step: Interval<'_>, moved_on: bool) -> (Kinematics, Stepped) {
+        let (Interval { start, times, h }, before) = (step, &{ self.energies });
         let mut motion = start.clone();
-        let ahead: Vec<DVec3> = start.x.iter().zip(&start.v).map(|(x, v)| x + v * h).collect();
-        let mut full = self.contacts(step, &ahead);
+        let mut full = self.contacts(step, &step.ahead());
         let turned = self.frame.volume > 0.0 && self.solver.inventory.inverted > 0;
         // Frozen contacts continue linearly, so surfaces that are being separated would be thrown apart.
         let through = full.iter().any(|contact| contact.is_penetrating(&start.x, h));
@@ -136,29 +131,31 @@ impl Stepper<'_> {
         };
         let StepEnd { x, v, errors, solved } = end;
         (motion.x, motion.v) = (x, v);
-        let mut stepped = Stepped { solved, euler: after.is_none(), ..Stepped::default() };
-        stepped.estimate = errors.iter().map(DVec3::norm_squared).fold(0.0, f64::max).sqrt();
+        let mut stepped = Stepped { solved, ..Stepped::default() };
+        let report = &mut stepped.report;
+        report.euler_steps = u32::from(after.is_none());
+        report.error_estimate = errors.iter().map(DVec3::norm_squared).fold(0.0, f64::max).sqrt();
         if full.iter().any(|c| (c.clearance(&start.x, h) < 0.0) != (c.clearance(&motion.x, 0.0) < 0.0)) {
             motion.carried.euler_steps_left = motion.carried.euler_steps_left.max(1);
         }
-        (stepped.contacts, stepped.overlap) = self.solver.active_contacts();
-        stepped.overlap = stepped.overlap.max(stepped.solved.deepest);
-        stepped.jammed = full.iter().filter(|contact| contact.is_jammed(&motion.x)).count() as u32;
-        if stepped.jammed > 0 {
+        (report.contacts, report.deepest_overlap) = self.solver.active_contacts();
+        report.deepest_overlap = report.deepest_overlap.max(stepped.solved.deepest);
+        report.jammed = full.iter().filter(|contact| contact.is_jammed(&motion.x)).count() as u32;
+        if report.jammed > 0 {
             // Shorter steps would not help.
             stepped.solved.unmet = 0.0;
         }
-        let discontinuous = stepped.euler || stepped.contacts > 0;
+        let discontinuous = after.is_none() || report.contacts > 0;
         let acceleration =
             |(v, before): (&DVec3, &DVec3)| if discontinuous { DVec3::zeros() } else { (v - before) / h };
         motion.acceleration = motion.v.iter().zip(&start.v).map(acceleration).collect();
         motion.loads = self.loads(&full, |contact| contact.load_at(&motion.x, 0.0));
-        self.keep_finite(start, &mut motion, &mut stepped);
+        report.stopped = self.keep_finite(start, &mut motion);
         // Infinity is no limit, not even times an approach of 0.
         let bounce = self.frame.bounce.filter(|bounce| bounce.is_finite());
         let slowed = bounce.and_then(|bounce| self.limit_bounce(bounce, &full, step, &mut motion));
         self.refresh_inventory(&motion.x);
-        stepped.after = match after.filter(|_| stepped.stopped == 0 && slowed.is_none()) {
+        stepped.after = match after.filter(|_| report.stopped == 0 && slowed.is_none()) {
             Some(energies) => energies,
             None => measure(self.solver, &self.context, times[1], [&motion.x, &motion.v], false),
         };
@@ -171,8 +168,10 @@ impl Stepper<'_> {
         } else {
             motion.carried.energy_budget = 0.0;
         }
-        stepped.impact_error = self.impact_error(step, &motion, &full, &errors);
-        stepped.energy_lost = self.energy_lost([before, &stepped.after], step, &motion, &full) + slowed.unwrap_or(0.0);
+        let taken = TakenStep { interval: step, end: &motion, contacts: &full };
+        stepped.impact_error = self.impact_error(taken, &errors);
+        let lost = self.energy_lost([before, &stepped.after], taken);
+        stepped.report.energy_lost = lost + slowed.unwrap_or(0.0);
         (motion, stepped)
     }
 
@@ -227,16 +226,18 @@ impl Stepper<'_> {
             && self.solver.contact_states.iter().all(|state| state.mode == ContactMode::Open)
     }
 
-    /// Stops particles whose result is not finite where they were.
-    fn keep_finite(&mut self, start: &Kinematics, motion: &mut Kinematics, stepped: &mut Stepped) {
+    /// Stops particles whose result is not finite where they were; returns how many.
+    fn keep_finite(&mut self, start: &Kinematics, motion: &mut Kinematics) -> u32 {
+        let mut stopped = 0;
         for particle in 0..motion.x.len() {
             if !motion.x[particle].iter().chain(motion.v[particle].iter()).all(|x| x.is_finite()) {
                 (motion.x[particle], motion.v[particle]) = (start.x[particle], DVec3::zeros());
                 motion.acceleration[particle] = DVec3::zeros();
-                stepped.stopped += 1;
+                stopped += 1;
                 self.solver.latest_inventory = None;
             }
         }
+        stopped
     }
 
     /// Slows particles relative to their mean motion if the step gained energy.
@@ -258,7 +259,7 @@ impl Stepper<'_> {
         for turning in [true, false] {
             let gained = -*budget;
             let mut moved = motion.v.clone();
-            for piece in &body.order.pieces {
+            for piece in body.pieces() {
                 let rigid = RigidMotion::new(body, held, piece, [&motion.x, &motion.v, &motion.acceleration]);
                 let rigid = if turning { rigid } else { rigid.without_rotation() };
                 for particle in rigid.particles.clone() {
@@ -278,7 +279,7 @@ impl Stepper<'_> {
             }
             let kinetic = kinetic(body, &motion.v);
             *budget += after.kinetic - kinetic;
-            stepped.energy_removed += after.kinetic - kinetic;
+            stepped.report.energy_removed += after.kinetic - kinetic;
             after.kinetic = kinetic;
         }
     }
@@ -305,11 +306,8 @@ pub(super) fn sum(a: Solved, b: Solved) -> Solved {
         cg: a.cg + b.cg,
         caps: a.caps + b.caps,
         residual: a.residual.max(b.residual),
-        first: b.first,
         failed: a.failed || b.failed,
         enough: a.enough.max(b.enough),
-        unmet: b.unmet,
-        passed: b.passed,
-        deepest: b.deepest,
+        ..b
     }
 }

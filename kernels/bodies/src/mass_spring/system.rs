@@ -7,7 +7,6 @@
 
 use super::body::SoftBody;
 use super::springs::{Record, Sums};
-use numerics::adjacency::Adjacency;
 use numerics::quad::Quad;
 use numerics::rank_one::{RankOneTerms, part_of};
 use numerics::simd::{Path, kernel};
@@ -48,16 +47,7 @@ impl System {
         self.regions.measure(p);
         self.transient.measure(p);
         let system = &*self;
-        clusters.sum(out, |cluster, out: &mut [Quad]| {
-            apply_in_cluster(Path::chosen(), system, &body.adjacency, clusters.range(cluster), p, out)
-        })
-    }
-
-    /// Sets which particles are `held`, and marks those whose springs have no stiffness as isolated.
-    pub(super) fn set_loose(&mut self, held: &[bool], particle_stiffness: &[f64]) {
-        self.held.copy_from_slice(held);
-        self.isolated.clear();
-        self.isolated.extend(particle_stiffness.iter().map(|k| *k == 0.0));
+        clusters.sum(out, |cluster, out: &mut [Quad]| apply_in_cluster(Path::chosen(), system, body, cluster, p, out))
     }
 
     /// Whether a particle does not move with its piece: it is pinned or isolated.
@@ -68,28 +58,18 @@ impl System {
 
 kernel! {
     /// The part of [`System::apply`] that belongs to one cluster.
-    fn apply_in_cluster(
-        system: &System,
-        adjacency: &Adjacency,
-        particles: std::ops::Range<usize>,
-        p: &[Quad],
-        out: &mut [Quad],
-    ) -> f64 = apply_in_cluster_body;
+    fn apply_in_cluster(system: &System, body: &SoftBody, cluster: usize, p: &[Quad], out: &mut [Quad]) -> f64
+        = apply_in_cluster_body;
 }
 
 #[inline(always)]
-fn apply_in_cluster_body(
-    system: &System,
-    adjacency: &Adjacency,
-    particles: std::ops::Range<usize>,
-    p: &[Quad],
-    out: &mut [Quad],
-) -> f64 {
+fn apply_in_cluster_body(system: &System, body: &SoftBody, cluster: usize, p: &[Quad], out: &mut [Quad]) -> f64 {
+    let particles = body.order.clusters.range(cluster);
     let first = particles.start;
     out.fill(Quad::default());
     let (mine, inertia) = (&p[particles.clone()], &system.inertia[particles.clone()]);
     // One loop for each kind of term: beside single components the compiler would not keep vectors in registers.
-    let springs = adjacency.each(particles.clone(), &system.records);
+    let springs = body.adjacency.each(particles.clone(), &system.records);
     for (index, ((mine, inertia), [inside, across])) in mine.iter().zip(inertia).zip(springs).enumerate() {
         let mut total = out[index] + *mine * *inertia;
         for record in inside {

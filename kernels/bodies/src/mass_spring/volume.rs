@@ -9,8 +9,6 @@
 use super::body::{SoftBody, volume};
 use super::stage::FrameContext;
 use numerics::partition::{Partition, RaggedSlice};
-use numerics::quad::Quad;
-use numerics::simd::{Path, kernel};
 use numerics::vector::{DVec2, DVec3};
 
 /// Bulk modulus of the springs ÷ E: their Poisson ratio is a quarter.
@@ -316,19 +314,6 @@ pub(super) fn opening([a, b, c, d]: [DVec3; 4]) -> [DVec3; 4] {
     [-(b + c + d), b, c, d]
 }
 
-kernel! {
-    /// Signed volumes of tetrahedra with particles at `x`.
-    fn tet_volumes(tets: &[[u32; 4]], x: &[DVec3], out: &mut [f64]) = tet_volumes_body;
-}
-
-#[inline(always)]
-fn tet_volumes_body(tets: &[[u32; 4]], x: &[DVec3], out: &mut [f64]) {
-    for (tet, out) in tets.iter().zip(out) {
-        let [a, b, c, d] = tet.map(|corner| Quad::new(x[corner as usize]));
-        *out = (b - a).dot((c - a).cross(d - a)) / 6.0;
-    }
-}
-
 /// State of all tetrahedra, evaluated once a step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Inventory {
@@ -345,18 +330,12 @@ impl Inventory {
     pub(super) fn new(body: &SoftBody, x: &[DVec3], rest: &[f64]) -> Self {
         let parts = body.tet_partition.map((), |part, ()| {
             let tets = body.tet_partition.range(part);
-            let mut volumes = vec![0.0; tets.len()];
-            tet_volumes(Path::chosen(), &body.tets[tets.clone()], x, &mut volumes);
-            let (mut inverted, mut now, mut before, mut watched) = (0, 0.0, 0.0, Vec::new());
-            for (tet, volume) in tets.zip(volumes) {
-                inverted += u32::from(volume < 0.0);
-                if volume <= WATCHED * rest[tet] {
-                    watched.push(tet as u32);
-                }
-                now += volume;
-                before += rest[tet];
-            }
-            (inverted, now, before, watched)
+            let now = body.tets[tets.clone()].iter().map(|tet| volume(tet.map(|corner| x[corner as usize])));
+            let volumes: Vec<f64> = now.collect();
+            let watched = tets.clone().zip(&volumes).filter(|(tet, volume)| **volume <= WATCHED * rest[*tet]);
+            let watched: Vec<u32> = watched.map(|(tet, _)| tet as u32).collect();
+            let inverted = volumes.iter().filter(|volume| **volume < 0.0).count() as u32;
+            (inverted, volumes.iter().sum::<f64>(), rest[tets].iter().sum::<f64>(), watched)
         });
         let (mut all, mut now, mut before) = (Self::default(), 0.0, 0.0);
         for (inverted, volume, rest, watched) in parts {

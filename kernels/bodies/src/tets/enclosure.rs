@@ -62,6 +62,14 @@ impl Enclosure {
         }
     }
 
+    /// Those of `candidates` (indices into `points`) that lie inside.
+    pub(crate) fn within(&self, points: &[[f64; 3]], mut candidates: Vec<u32>) -> Vec<u32> {
+        let mut inside = vec![false; points.len()];
+        self.mark(points, &candidates, &mut inside);
+        candidates.retain(|point| inside[*point as usize]);
+        candidates
+    }
+
     /// Where those of `candidates` (indices into `points`) that lie inside leave the surface along a unit `direction`,
     /// in their order.
     pub(crate) fn exits(&self, points: &[[f64; 3]], candidates: &[u32], direction: DVec3) -> Vec<Exit> {

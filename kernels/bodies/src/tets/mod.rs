@@ -37,7 +37,7 @@ mod surface_fault;
 mod winding;
 
 pub use boundary::{BoundaryFace, boundary};
-pub(crate) use boundary::{FACES, faces_of, oriented_boundary, sorted};
+pub(crate) use boundary::{faces_of, oriented_boundary, sorted};
 pub use cage::{Cage, CagedSurface};
 pub use closed::ClosedSurface;
 pub use cubes::cubes;

@@ -73,7 +73,7 @@ fn a_spike_rising_into_a_triangle_pushes_it_up() {
     let risen = spike.map(|[x, y, z]| [x, y + 0.3, z]);
     let faces = [[0, 2, 1], [0, 3, 2], [0, 1, 3], [1, 2, 3]];
     let spike = Obstacle::new(&faces, &[pose(0.0, &spike), pose(1.0, &risen)], 1.0, 0.01, 0.5).unwrap();
-    assert!(spike.is_closed());
+    assert!(spike.surface.closed);
     let sheet = [[-1.0, 0.2, -1.0], [-1.0, 0.2, 2.0], [2.0, 0.2, -1.0]];
     let skin = BodySkin::new(&sheet, &[[0, 2, 1]], &[]).unwrap();
     let contacts = find(
