@@ -129,7 +129,7 @@ params! { PARAMS:
         "Angular velocity of the liquid at the start, in radians per second, about its centre of mass.")
         .unit(Unit::PerSecond).fixed();
     RESOLUTION: Param<i64> = Param::int("resolution", 1,
-        "Number of surface cells per edge of a cell. 2 keeps finer detail of the surface and, in a splash, much of the \
+        "Number of surface cells per edge of a cell. 2 keeps finer detail of the surface and, in a splash, more of the \
             volume that 1 loses, in two to three times the time; velocity and pressure keep their cells.")
         .within(1.0, 4.0).fixed();
     TIME_SCALE: Param<f64> = Param::double("time_scale", 1.0,
@@ -190,9 +190,9 @@ metrics! { METRICS:
         .warn_last_outside(-0.03, 0.03, "This share of the liquid's volume was lost (below 0) or gained (above 0) up to this frame because \
             cells and substeps are too coarse. `volume_correction` has made good {volume_made_good} % of the volume, {made_good_now} % \
             in the frame alone: the volume as a whole is right, but some parts of the liquid are too thick and others too thin. Films, \
-            drops, sheets and jets of less than two cells are lost, and what overlaps where surfaces meet or liquid hits something. Raise \
-            `resolution` to 2 and lower `cfl` to 1, which keeps most of it in four times the time. In a splash a smaller `cell` \
-            alone helps little.");
+            drops, sheets and jets of less than two cells are lost, and what overlaps where surfaces meet or liquid hits something. Where \
+            `resolution` is 1 and `cfl` 2, 2 and 1 leave a third to an eighth of the error, in four times the time. In a splash a smaller \
+            `cell` alone helps little.");
     MADE_GOOD = Metric::new("volume_made_good", Unit::Percent,
         "Volume that correction has added or removed since the start, in percent of the volume.");
     MADE_GOOD_NOW = Metric::new("made_good_now", Unit::Percent,
