@@ -341,7 +341,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
-    19,
+    20,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
      other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
      pins hold them. `stiffness` has the same effect at any mesh resolution as long as tets are about as wide as long \

@@ -20,19 +20,15 @@ impl BodySolver {
     /// What touches no obstacle yet closes none: the line search stops it where it first does, and friction begins there.
     /// Without friction it would glide on. Nor do heaps, which are pressed into more contacts than can be met.
     pub(super) fn close_contacts(&mut self, stage: &Stage<'_>, x: &[DVec3], right: &mut [DVec3]) -> bool {
-        let mut touched = vec![false; stage.context.body.order.pieces.len()];
-        let piece_of = |first: u32| stage.context.body.layout.piece_of(first as usize);
-        let known = stage.contacts.iter().zip(&mut self.contact_states);
-        let mut known: Vec<_> = known.filter(|known| !known.0.is_two_sided()).collect();
-        for (contact, _) in known.iter().filter(|known| known.1.normal_force > 0.0) {
-            let first = contact.particles[0];
-            touched[piece_of(first)] = self.heaps.get(first as usize) != Some(&true);
-        }
-        known.retain_mut(|(contact, state)| touched[piece_of(contact.particles[0])] && contact.close(state, &self.dx));
-        let (closed, square) = (!known.is_empty(), stage.a * stage.a);
-        for (contact, state) in known {
-            for (particle, weight) in contact.sides().filter(|side| !self.system.held[side.0]) {
-                right[particle] += contact.normal * (state.normal_force * weight * square);
+        let (touching, square, mut closed) = (self.touching_obstacles(stage), stage.a * stage.a, false);
+        for (contact, state) in stage.contacts.iter().zip(&mut self.contact_states) {
+            let first = contact.particles[0] as usize;
+            let may_close = touching[stage.context.body.layout.piece_of(first)] && self.heaps.get(first) != Some(&true);
+            if may_close && !contact.is_two_sided() && contact.close(state, &self.dx) {
+                closed = true;
+                for (particle, weight) in contact.sides().filter(|side| !self.system.held[side.0]) {
+                    right[particle] += contact.normal * (state.normal_force * weight * square);
+                }
             }
         }
         if closed {

@@ -232,7 +232,7 @@ impl BodySolver {
         }
     }
 
-    /// Tries 1, ½, ¼ … of `dx` until the objective falls below `base`, each both unchanged and limited by [`stop`].
+    /// Tries 1, ½, ¼ … of `dx` until the objective falls below `base`, each both unchanged and limited by [`Self::stop`].
     /// `dx` becomes the direction actually taken. Returns the fraction of it, 0 if none lowers the objective, the objective at
     /// the end, and whether particles were stopped at contacts.
     ///
@@ -249,7 +249,7 @@ impl BodySolver {
             if !stopped {
                 trial.clear();
                 trial.extend(x.iter().zip(&self.dx).map(|(x, d)| x + d * share));
-            } else if !stop(stage, x, &mut trial) {
+            } else if !self.stop(stage, x, &mut trial) {
                 continue;
             }
             let contacts = self.contact_objective(stage, &trial);
@@ -270,22 +270,35 @@ impl BodySolver {
         self.trial = trial;
         found
     }
-}
 
-/// Stops single points on their way from `x` to `trial` where they would get too deep into a contact; returns
-/// whether there were any. The direction does not know of contacts that it closes and linearises their forces; a
-/// single such point would otherwise shorten the step of all others.
-fn stop(stage: &Stage<'_>, x: &[DVec3], trial: &mut [DVec3]) -> bool {
-    let mut stopped = false;
-    let held = &stage.context.external.held;
-    for contact in stage.contacts.iter().filter(|contact| contact.is_of_one_point()) {
-        if contact.sides().all(|side| held[side.0]) {
-            continue;
-        }
-        if let Some(back) = contact.overshoot(x, trial) {
-            contact.shift(back, held, trial);
+    /// Stops single points on their way from `x` to `trial` where they would get too deep into a contact; returns
+    /// whether there were any. The direction does not know of contacts that it closes and linearises their forces; a
+    /// single such point would otherwise shorten the step of all others. Free pieces that touch no obstacle yet stop as wholes:
+    /// falling on, their inside would pass their skin and be found below the obstacle.
+    fn stop(&self, stage: &Stage<'_>, x: &[DVec3], trial: &mut [DVec3]) -> bool {
+        let (body, held, mut stopped) = (stage.context.body, &stage.context.external.held, false);
+        let (pieces, touching): (Vec<_>, _) = (body.pieces().collect(), self.touching_obstacles(stage));
+        let moves = |contact: &&ContactConstraint| contact.sides().any(|side| !held[side.0]);
+        for contact in stage.contacts.iter().filter(|contact| contact.is_of_one_point()).filter(moves) {
+            let Some(back) = contact.overshoot(x, trial) else { continue };
+            let piece = body.layout.piece_of(contact.particles[0] as usize);
+            if self.groups[piece].is_some() && !touching[piece] {
+                trial[pieces[piece].clone()].iter_mut().for_each(|trial| *trial += contact.normal * back);
+            } else {
+                contact.shift(back, held, trial);
+            }
             stopped = true;
         }
+        stopped
     }
-    stopped
+
+    /// Whether each piece is pressed by an obstacle, as last linearised.
+    pub(super) fn touching_obstacles(&self, stage: &Stage<'_>) -> Vec<bool> {
+        let mut touching = vec![false; stage.context.body.order.pieces.len()];
+        let known = stage.contacts.iter().zip(&self.contact_states);
+        for (contact, _) in known.filter(|known| known.1.normal_force > 0.0 && !known.0.is_two_sided()) {
+            touching[stage.context.body.layout.piece_of(contact.particles[0] as usize)] = true;
+        }
+        touching
+    }
 }
