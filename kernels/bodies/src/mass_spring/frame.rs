@@ -103,7 +103,7 @@ pub struct FrameReport {
     /// Steps in which an obstacle near a body turned farther than contacts can follow.
     pub fast_turns: u32,
     /// Estimated error of positions that the frame added, metres: the sum over its steps of the largest error of a
-    /// particle.
+    /// particle that is not of a heap, whose motion no step is short enough for.
     pub error_estimate: f64,
     /// Kinetic energy, joules.
     pub kinetic: f64,
@@ -281,9 +281,10 @@ impl Stepper<'_> {
     /// Whether the frame took so many Newton iterations that steps are accepted, so that it ends. Where `substeps` sets their
     /// number, each is solved like the first.
     pub(super) fn is_spent(&self) -> bool {
-        /// By default, and with a tolerance.
+        /// By default and with heaps, and with a tolerance.
         const MOST_NEWTON: [u32; 2] = [400, 4000];
-        self.frame.substeps == 0 && self.report.newton >= MOST_NEWTON[usize::from(self.tolerance.is_some())]
+        let precise = self.tolerance.is_some() && self.solver.heaps.is_empty();
+        self.frame.substeps == 0 && self.report.newton >= MOST_NEWTON[usize::from(precise)]
     }
 
     /// The number of parts that a step has to be cut into because of obstacles that turn.

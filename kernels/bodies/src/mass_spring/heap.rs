@@ -3,7 +3,8 @@
 //! The skin of a heap is crushed into more contacts with itself than can be met. Repeated detection and shorter steps would
 //! only press more of it into each other and throw what they meet apart: 700 Newton iterations a frame for particles that flew
 //! metres high and deep. Contacts of a heap with skin are therefore those that are first detected in a step, and their depth
-//! is accepted. Those with the ground and obstacles are met as always, in at most four rounds of 60 iterations a step.
+//! is accepted. Those with the ground and obstacles are met as always, in at most four rounds of 60 iterations a step. Nor are steps cut for
+//! the errors of heaps: with a tolerance a frame of 340 particles took 4,200 iterations in 200 steps.
 
 use super::body::SoftBody;
 use numerics::vector::DVec3;

@@ -134,7 +134,9 @@ impl Stepper<'_> {
         let mut stepped = Stepped { solved, ..Stepped::default() };
         let report = &mut stepped.report;
         report.euler_steps = u32::from(after.is_none());
-        report.error_estimate = errors.iter().map(DVec3::norm_squared).fold(0.0, f64::max).sqrt();
+        let heaps = &self.solver.heaps;
+        let counted = errors.iter().enumerate().filter(|(particle, _)| heaps.get(*particle) != Some(&true));
+        report.error_estimate = counted.map(|error| error.1.norm_squared()).fold(0.0, f64::max).sqrt();
         if full.iter().any(|c| (c.clearance(&start.x, h) < 0.0) != (c.clearance(&motion.x, 0.0) < 0.0)) {
             motion.carried.euler_steps_left = motion.carried.euler_steps_left.max(1);
         }

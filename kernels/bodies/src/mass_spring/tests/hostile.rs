@@ -277,16 +277,23 @@ fn what_is_crushed_by_its_weight_stays_on_the_ground_in_a_bounded_number_of_iter
     let (points, tets) = cubes([4; 3], [0.0, 0.2, 0.0], [0.2; 3]);
     let single: Vec<[f32; 3]> = points.iter().map(|p| p.map(|x| x as f32)).collect();
     let faces: Vec<[u32; 3]> = boundary(&tets, &single).iter().map(|face| face.corners).collect();
-    for (stiffness, density, gravity) in
-        [(5e3, 1e3, 1e4), (1e-6, 1e-6, 1e4), (1e-6, 1e6, 1e4), (5e3, 1e6, 9.81), (1.0, 1e3, 9.81)]
-    {
+    let default = Integrator::Default;
+    for (stiffness, density, gravity, integrator) in [
+        (5e3, 1e3, 1e4, default),
+        (1e-6, 1e-6, 1e4, default),
+        (1e-6, 1e6, 1e4, default),
+        (5e3, 1e6, 9.81, default),
+        (1.0, 1e3, 9.81, default),
+        (1e-6, 1e3, 9.81, Integrator::Accurate { tolerance: 1e-3 }),
+    ] {
         let mesh = Mesh { points: &points, tets: &tets, ..Mesh::default() };
         let body = SoftBody::new(&mesh, &material(density, stiffness, 0.01), &[]).unwrap();
         let skins = [BodySkin::new(&points, &faces, &body.springs()).unwrap()];
         let ground = Some(Ground { up: [0.0, 1.0, 0.0], height: 0.0, thickness: 1e-3, friction: 0.5 });
         let self_contact = Some(ContactParams { thickness: 1e-3, friction: 0.5 });
         let scene = CollisionScene { skins: &skins, ground, self_contact, ..CollisionScene::default() };
-        let frame = SolverFrame { contacts: Some(&scene), gravity: [0.0, -gravity, 0.0], ..SolverFrame::default() };
+        let gravity_at = [0.0, -gravity, 0.0];
+        let frame = SolverFrame { contacts: Some(&scene), gravity: gravity_at, integrator, ..SolverFrame::default() };
         let (mut state, mut solver) = (State::at_rest(&body), BodySolver::new(&body));
         let mut newton = 0;
         for number in 0..24 {
