@@ -18,12 +18,12 @@ use super::setup::{MaterialFields, ParticleNumber, SimulationSetup, StartInputs,
 use super::{
     BODY_COLLISION, BOUNCE, CARRIED_OUTSIDE, CARRIED_VOLUME_RATIO, COLLIDERS, COUPLING_BREAK, DEEPEST_OVERLAP,
     DEEPEST_PENETRATION, DRAG, FRICTION, GOAL_DISTANCE, GOAL_ON, GOALS, GRAVITY, GROUND, GROUND_HEIGHT, IDLE_PINS,
-    IDLE_PINS_POINT, IDLE_PINS_WIRE, INITIAL_VELOCITY, INTEGRATOR, KEEP_DENTS, LET_GO, LOST_SHARE, NOT_PUSHED_OUT,
-    PINNED, PINS, PLASTIC_CREEP, PLASTIC_WORK, PLASTIC_YIELD, POINTS_INSIDE, RESET_ENERGY, RESET_FRAMES,
-    RESET_TO_GOALS, SELF_COLLISION, SELF_CROSSINGS, SEPARATION_FRAMES, SOFTEST_DIRECTION, START_FRAME,
-    STARTED_CROSSING, STARTED_IN_BODIES, STARTED_IN_BODIES_OTHER, STARTED_IN_BODIES_WIRE, STARTED_IN_COLLIDERS,
-    STARTED_INSIDE, STIFFEST_DIRECTION, STIFFEST_DIRECTION_WIRE, STIFFNESS_LIMITED, STIFFNESS_TO_WEIGHT, SUBSTEPS,
-    SURFACE, Stepping, TETS, THICKNESS, TIME_SCALE, TOLERANCE, VOLUME,
+    IDLE_PINS_POINT, IDLE_PINS_WIRE, INITIAL_VELOCITY, INTEGRATOR, INWARD_COLLIDERS, INWARD_COLLIDERS_WIRE, KEEP_DENTS,
+    LET_GO, LOST_SHARE, NOT_PUSHED_OUT, PINNED, PINS, PLASTIC_CREEP, PLASTIC_WORK, PLASTIC_YIELD, POINTS_INSIDE,
+    RESET_ENERGY, RESET_FRAMES, RESET_TO_GOALS, SELF_COLLISION, SELF_CROSSINGS, SEPARATION_FRAMES, SOFTEST_DIRECTION,
+    START_FRAME, STARTED_CROSSING, STARTED_IN_BODIES, STARTED_IN_BODIES_OTHER, STARTED_IN_BODIES_WIRE,
+    STARTED_IN_COLLIDERS, STARTED_INSIDE, STIFFEST_DIRECTION, STIFFEST_DIRECTION_WIRE, STIFFNESS_LIMITED,
+    STIFFNESS_TO_WEIGHT, SUBSTEPS, SURFACE, Stepping, TETS, THICKNESS, TIME_SCALE, TOLERANCE, VOLUME,
 };
 use super::{carried, obstacles, pins};
 
@@ -180,6 +180,10 @@ impl Run {
             self.metrics.set(STARTED_INSIDE, inside as f64);
             set_overlaps(&setup, &overlaps, &mut self.metrics);
             self.metrics.set(CARRIED_OUTSIDE, setup.carried_outside() as f64);
+            let points = setup.contact_points(&self.state.positions);
+            let rooms = || (0..obstacles.len()).filter(|wire| obstacles::is_room_beside(&obstacles[*wire], &points));
+            self.metrics.set(INWARD_COLLIDERS, rooms().count() as f64);
+            self.metrics.set(INWARD_COLLIDERS_WIRE, rooms().next().map_or(-1.0, |wire| wire as f64));
             set_evenness(&setup, &solving.body, &mut self.metrics);
             self.close = scene.too_close(&setup.contact_points(&self.state.positions), &overlaps);
             self.overlaps = overlaps;
@@ -358,7 +362,9 @@ impl Run {
 }
 
 /// Metrics of the start that later frames publish, too.
-const AT_START: [Metric; 10] = [
+const AT_START: [Metric; 12] = [
+    INWARD_COLLIDERS,
+    INWARD_COLLIDERS_WIRE,
     STARTED_CROSSING,
     STARTED_INSIDE,
     STARTED_IN_BODIES,

@@ -205,7 +205,7 @@ fn edge_length(edge: &Edge, places: &[[f64; 3]]) -> f64 {
 }
 
 /// Six times the volume that triangles enclose; relative to a point of theirs, so that far from the origin nothing is lost.
-fn signed_volume(triangles: &[[u32; 3]], places: &[[f64; 3]]) -> f64 {
+pub(super) fn signed_volume(triangles: &[[u32; 3]], places: &[[f64; 3]]) -> f64 {
     let origin = DVec3::from(places[triangles[0][0] as usize]);
     let corners = |face: &[u32; 3]| face.map(|corner| DVec3::from(places[corner as usize]) - origin);
     triangles.iter().map(corners).map(|[a, b, c]| a.dot(&b.cross(&c))).sum()

@@ -1,6 +1,7 @@
 //! Obstacles: animated meshes, and the ground.
 
 use super::CollisionError;
+use super::body_skin::signed_volume;
 use super::motion::{Motion, ObstaclePose};
 use super::surface::{Moment, TriangleSurface};
 use numerics::swept::SweptElements;
@@ -82,6 +83,11 @@ impl Obstacle {
     /// motion and a linear remainder.
     pub fn at(&self, share: f64) -> Vec<[f64; 3]> {
         self.motion.at(share)
+    }
+
+    /// Whether it is closed with faces that point inwards at the start of the frame: it holds what is in it.
+    pub fn is_room(&self) -> bool {
+        self.surface.closed && signed_volume(&self.surface.triangles, &self.at(0.0)) < 0.0
     }
 
     /// Its velocity at the point of a triangle with barycentric `weights`, m/s.

@@ -34,6 +34,28 @@ fn particles_that_start_inside_something_are_counted_at_every_frame() {
     assert_eq!((inside(two(0.2)), inside(two(0.06).set(BODY_COLLISION, false))), (0.0, 0.0));
 }
 
+/// The cube beside a solid, beside the same with its faces turned round, and within that, which is a room.
+#[test]
+fn a_collider_with_faces_that_point_inwards_is_said_where_bodies_are_outside_it() {
+    let cook = |low: [f32; 3], turned: bool| {
+        let mut other = solid(low, 0.5);
+        if turned {
+            let corners = other.faces().unwrap().corners.iter().rev().copied().collect();
+            other = Component::mesh(vec![3; 12], corners, other.positions().to_vec()).unwrap();
+        }
+        simulating(cube()).input(COLLIDERS, solid([5.0; 3], 0.1)).input(COLLIDERS, other).frames([1, 8])
+    };
+    let said = |frame: &BenchResult| ["inward_colliders", "inward_colliders_wire"].map(|name| frame.metrics[name]);
+    let rooms = |low: [f32; 3], turned: bool| cook(low, turned).iter().map(said).collect::<Vec<_>>();
+    assert_eq!(rooms([0.3, -0.2, -0.2], false), [[0.0, -1.0]; 2], "solid");
+    assert_eq!(rooms([0.3, -0.2, -0.2], true), [[1.0, 1.0]; 2], "a room beside the cube");
+    assert_eq!(rooms([0.05, -0.2, -0.2], true), [[1.0, 1.0]; 2], "half of the cube is in it");
+    assert_eq!(rooms([-0.2; 3], true), [[0.0, -1.0]; 2], "a room around the cube");
+    // The cube falls by 0.4 m in that time: onto the solid, and into the room.
+    let [on, into] = [false, true].map(|turned| lowest(&cook([-0.2, -0.6, -0.2], turned)[1]));
+    assert!(on > -0.101 && into < -0.3, "{on} {into}");
+}
+
 /// Bars of 0.1 × 0.1 × 0.5 m through each other's middle, with cells of 0.1 m: all points lie on the other's faces or outside.
 #[test]
 fn bars_that_start_crossed_are_said_from_the_first_frame() {
