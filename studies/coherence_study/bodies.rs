@@ -5,6 +5,7 @@ use numerics::vector::{DVec3, Vec3, to_f32, to_f64};
 use std::collections::BTreeMap;
 
 /// A triangle mesh.
+#[derive(Clone)]
 pub(crate) struct Body {
     pub(crate) points: Vec<Vec3>,
     pub(crate) triangles: Vec<[u32; 3]>,

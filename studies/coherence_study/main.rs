@@ -7,7 +7,8 @@
 //! more than a quarter of their length; those are added whose curves do not jump in the wind alone.
 //!
 //! `… --bin coherence_study heights`: which heights above the skin `offset_scale` and `loft` keep, on these bodies and a
-//! plane. `unfreed`: which segments cross in a storm.
+//! plane. `unfreed`: which segments cross in a storm. `follow`: the tips that jump at `coherence` 1 where those of the wind alone do not,
+//! each followed in ever smaller steps: how far it moves in the longest of them, and how far the wind alone moves it there.
 
 mod bodies;
 mod crossing;
@@ -41,6 +42,12 @@ fn main() {
     }
     if words.iter().any(|word| word == "heights") {
         return print_heights(curves);
+    }
+    if words.iter().any(|word| word == "follow") {
+        for body in asked(["camel", "folds", "knot", "sphere"]) {
+            print_followed(body, &Groom::on(Body::named(body), curves), pairs);
+        }
+        return;
     }
     let loft = number("loft=", 0.0);
     let mut coherences = numbers("coherence=");
@@ -88,6 +95,80 @@ fn compared(
         wind.extend(blown);
     }
     (sums, wind)
+}
+
+/// The parts into which the frame of a jump is cut.
+const CUTS: [u32; 4] = [1, 8, 64, 256];
+
+/// Tips that jump at `coherence` 1 on a still skin and not in the wind alone, step by step.
+fn print_followed(body: &str, groom: &Groom, pairs: usize) {
+    println!(
+        "body    curve   frame  of a frame  longest step/L: after collision  of the wind then  of the wind at most"
+    );
+    for pair in 0..pairs {
+        let frame = FRAMES * pair as f64 / pairs as f64;
+        for curve in jumping(groom, frame, 1.0) {
+            let one = groom.only(curve);
+            for cuts in CUTS {
+                let way = longest_step(&one, frame, cuts);
+                println!(
+                    "{body:7} {curve:6} {frame:6} {:>11} {:31.5} {:17.5} {:19.5}",
+                    format!("1/{cuts}"),
+                    way.collided,
+                    way.of_wind_then,
+                    way.of_wind
+                );
+            }
+        }
+    }
+}
+
+/// The curves whose tips jump in a `step` after `frame`, and not in the wind alone.
+fn jumping(groom: &Groom, frame: f64, step: f64) -> Vec<usize> {
+    let [before, after] = [frame, frame + step].map(|frame| still(groom, frame));
+    let moved = ways(groom, &before.collided, &after.collided);
+    let blown = ways(groom, &before.blown, &after.blown);
+    (0..moved.len()).filter(|curve| moved[*curve] > JUMP && blown[*curve] <= JUMP).collect()
+}
+
+/// Curves on a still skin.
+struct Still {
+    /// In the wind alone, and after collision with `coherence` 1.
+    blown: Vec<Vec3>,
+    collided: Vec<Vec3>,
+}
+
+fn still(groom: &Groom, frame: f64) -> Still {
+    let sample = groom.at(Case::Still, frame);
+    let collided = collided(groom, &sample, 1.0, 0.0).points;
+    Still { blown: sample.goal, collided }
+}
+
+/// The longest of the ways in the parts of a frame.
+#[derive(Clone, Copy, Debug, Default)]
+struct Longest {
+    collided: f64,
+    /// That of the wind in the same part.
+    of_wind_then: f64,
+    /// The wind's longest in any part.
+    of_wind: f64,
+}
+
+/// The longest step of the tip of a groom's one curve in the frame after `frame`, cut into so many parts.
+fn longest_step(one: &Groom, frame: f64, cuts: u32) -> Longest {
+    let mut longest = Longest::default();
+    let mut before = still(one, frame);
+    for part in 1..=cuts {
+        let after = still(one, frame + f64::from(part) / f64::from(cuts));
+        let moved = ways(one, &before.collided, &after.collided)[0];
+        let blown = ways(one, &before.blown, &after.blown)[0];
+        longest.of_wind = longest.of_wind.max(blown);
+        if moved > longest.collided {
+            (longest.collided, longest.of_wind_then) = (moved, blown);
+        }
+        before = after;
+    }
+    longest
 }
 
 /// Segments that cross in each of 48 frames of a storm, without coherence.
@@ -231,6 +312,20 @@ mod tests {
             let (added, crossings) = (sums.added_percent(), sums.crossings as f64 / sums.samples);
             println!("{body}: {added:.4} % of tips jump, {crossings} segments cross");
             assert!(added <= most && crossings <= 1.0, "{body}: {added} % of at most {most}, {crossings} crossings");
+        }
+    }
+
+    /// What moves by more than a quarter of its length in a degree of wind on a sphere does so evenly: in a part of the degree it moves by
+    /// little more than that part of the way.
+    #[test]
+    fn the_last_fast_tip_on_a_sphere_does_not_jump() {
+        let groom = Groom::on(Body::named("sphere"), 10_000);
+        let found = jumping(&groom, 80.0, 1.0);
+        assert!(found.len() <= 1, "{found:?}");
+        for curve in found {
+            let one = groom.only(curve);
+            let [whole, parts] = [1, 16].map(|cuts| longest_step(&one, 80.0, cuts).collided);
+            assert!(whole > JUMP && parts < 1.5 * whole / 16.0, "{parts} of {whole}");
         }
     }
 }

@@ -84,6 +84,18 @@ impl Groom {
         Sample { tree: TriangleTree::build(&points, &self.body.triangles), normals, rest, goal }
     }
 
+    /// The same groom with one curve alone; on a still skin.
+    pub(crate) fn only(&self, curve: usize) -> Self {
+        let cvs = self.starts[curve] as usize..self.starts[curve + 1] as usize;
+        Self {
+            body: self.body.clone(),
+            starts: vec![0, cvs.len() as u32],
+            rest: self.rest[cvs].to_vec(),
+            binding: self.binding.clone(),
+            field: self.field.clone(),
+        }
+    }
+
     /// Whether a point is judged: not where the plane ends within reach of its curve.
     pub(crate) fn is_judged(&self, p: Vec3) -> bool {
         self.body.points.len() > 4 || (p[0].abs() < 1.3 && p[2].abs() < 1.3)
