@@ -244,6 +244,12 @@ metrics! { METRICS:
          by how much they are closer than `thickness`, at worst. More than `thickness` means that something is inside.");
     POINTS_INSIDE = Metric::new("points_inside", Unit::None,
         "Particles and surface points of the output that lie inside a closed collider or another body.");
+    INWARD_COLLIDERS = Metric::new("inward_colliders", Unit::None,
+        "Closed colliders whose faces point inwards, although bodies are outside them when the simulation starts.")
+        .warn_above(0.0, "The faces of {colliders:inward_colliders_wire} point inwards, so it is a room that holds what is in it, \
+            and bodies that start outside pass through its faces. If it is meant to be solid, turn its faces round where it is made: \
+            the corners of each, seen from outside, run counter-clockwise.");
+    INWARD_COLLIDERS_WIRE = Metric::new("inward_colliders_wire", Unit::None, "The first of these colliders, from 0; −1 if there is none.");
     DEEPEST_PENETRATION = Metric::new("deepest_penetration", Unit::Metres,
         "By how much `deepest_overlap` exceeds `thickness`: how far points, or edges, went through surfaces of colliders \
          and other bodies. 0 until all that started inside has been pushed out.")
@@ -280,12 +286,6 @@ metrics! { METRICS:
         "Pairs of a body and a closed collider, or the ground, that are inside each other when the simulation starts.")
         .warn_above(0.0, "Bodies start inside a collider or below the ground, and are pushed out the shortest way over 12 \
             frames, which may be the wrong one. Move them apart at `start_frame`.");
-    INWARD_COLLIDERS = Metric::new("inward_colliders", Unit::None,
-        "Closed colliders whose faces point inwards, although bodies are outside them when the simulation starts.")
-        .warn_above(0.0, "The faces of {colliders:inward_colliders_wire} point inwards, so it is a room that holds what is in it, \
-            and bodies that start outside pass through its faces. If it is meant to be solid, turn its faces round where it is made: \
-            the corners of each, seen from outside, run counter-clockwise.");
-    INWARD_COLLIDERS_WIRE = Metric::new("inward_colliders_wire", Unit::None, "The first of these colliders, from 0; −1 if there is none.");
     NOT_PUSHED_OUT = Metric::new("not_pushed_out", Unit::None,
         "Points that have been inside something since the start and still are after 12 frames. Not reported before that, \
          or if none started inside.")
@@ -347,7 +347,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "Softbody",
-    20,
+    21,
     "Simulates soft bodies: dough, gelatine, eggs. They fall, wobble, and collide with colliders, the ground, each \
      other and themselves, with friction. They keep their volume and, if plastic, their dents; goals direct them and \
      pins hold them. `stiffness` has the same effect at any mesh resolution as long as tets are about as wide as long \

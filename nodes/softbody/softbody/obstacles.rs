@@ -52,13 +52,6 @@ pub(super) fn obstacles(
     Ok(obstacles)
 }
 
-/// Whether it is a room, and some of `points` are beyond its bounds at the start of the frame.
-pub(super) fn is_room_beside(obstacle: &Obstacle, points: &[[f64; 3]]) -> bool {
-    let at = obstacle.at(0.0);
-    let within = |p: &[f64; 3]| (0..3).all(|k| at.iter().any(|at| at[k] <= p[k]) && at.iter().any(|at| at[k] >= p[k]));
-    obstacle.is_room() && !points.iter().all(within)
-}
-
 /// Whether `b` is `a` mirrored.
 fn turned_round(a: &Component, b: &Component) -> bool {
     let inside_out = a.faces().zip(b.faces()).is_some_and(|(a, b)| a.is_inside_out(b));

@@ -180,10 +180,9 @@ impl Run {
             self.metrics.set(STARTED_INSIDE, inside as f64);
             set_overlaps(&setup, &overlaps, &mut self.metrics);
             self.metrics.set(CARRIED_OUTSIDE, setup.carried_outside() as f64);
-            let points = setup.contact_points(&self.state.positions);
-            let rooms = || (0..obstacles.len()).filter(|wire| obstacles::is_room_beside(&obstacles[*wire], &points));
-            self.metrics.set(INWARD_COLLIDERS, rooms().count() as f64);
-            self.metrics.set(INWARD_COLLIDERS_WIRE, rooms().next().map_or(-1.0, |wire| wire as f64));
+            let rooms = scene.rooms_beside(&setup.contact_points(&self.state.positions));
+            self.metrics.set(INWARD_COLLIDERS, rooms.len() as f64);
+            self.metrics.set(INWARD_COLLIDERS_WIRE, rooms.first().map_or(-1.0, |wire| *wire as f64));
             set_evenness(&setup, &solving.body, &mut self.metrics);
             self.close = scene.too_close(&setup.contact_points(&self.state.positions), &overlaps);
             self.overlaps = overlaps;

@@ -86,7 +86,7 @@ impl Obstacle {
     }
 
     /// Whether it is closed with faces that point inwards at the start of the frame: it holds what is in it.
-    pub fn is_room(&self) -> bool {
+    pub(super) fn is_room(&self) -> bool {
         self.surface.closed && signed_volume(&self.surface.triangles, &self.at(0.0)) < 0.0
     }
 

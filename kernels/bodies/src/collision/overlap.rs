@@ -12,6 +12,7 @@
 //! Limit: bodies of which only edges cross, with no point of one inside the other, are not pushed apart;
 //! [`CollisionScene::crossings`] finds them.
 
+use super::obstacle::Obstacle;
 use super::solid::Solid;
 use super::surface::{Moment, TriangleSurface};
 use super::{ActOnPair, Closeness, CollisionScene, ReleasedElements, Yielding};
@@ -195,6 +196,26 @@ impl CollisionScene<'_> {
             }
         }
         (found, inside.iter().filter(|inside| **inside).count())
+    }
+
+    /// Indices of obstacles that are rooms and have points of bodies outside them at the start of the frame: farther out
+    /// than the distance to keep.
+    pub fn rooms_beside(&self, x: &[[f64; 3]]) -> Vec<usize> {
+        let points: Vec<[f64; 3]> = self.skins.iter().flat_map(|skin| &skin.touching).map(|p| x[*p as usize]).collect();
+        let is_beside = |obstacle: &Obstacle| {
+            let turned: Vec<[u32; 3]> = obstacle.surface.triangles.iter().map(|[a, b, c]| [*a, *c, *b]).collect();
+            let room = Enclosure::new(&obstacle.at(0.0), &turned, 0.0);
+            let mut inside = vec![false; points.len()];
+            let steps = (0..3).flat_map(|axis| [-obstacle.thickness, obstacle.thickness].map(|by| (axis, by)));
+            for (axis, by) in std::iter::once((0, 0.0)).chain(steps) {
+                let mut beside = points.clone();
+                beside.iter_mut().for_each(|point| point[axis] += by);
+                let left = (0..points.len() as u32).filter(|point| !inside[*point as usize]).collect::<Vec<_>>();
+                room.mark(&beside, &left, &mut inside);
+            }
+            inside.contains(&false)
+        };
+        (0..self.obstacles.len()).filter(|k| self.obstacles[*k].is_room() && is_beside(&self.obstacles[*k])).collect()
     }
 
     /// The upward direction of the ground, and how far a skin may be pushed down towards it.

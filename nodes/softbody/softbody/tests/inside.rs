@@ -56,6 +56,41 @@ fn a_collider_with_faces_that_point_inwards_is_said_where_bodies_are_outside_it(
     assert!(on > -0.101 && into < -0.3, "{on} {into}");
 }
 
+/// A solid of a profile in x and y, given counter-clockwise, from z −0.2 to 0.3 m, with its faces turned round.
+fn room(profile: &[[f32; 2]], caps: &[[u32; 4]]) -> Component {
+    let count = profile.len() as u32;
+    let points = [-0.2, 0.3].iter().flat_map(|z| profile.iter().map(|[x, y]| [*x, *y, *z])).collect();
+    let walls = (0..count).map(|k| [k + count, (k + 1) % count + count, (k + 1) % count, k]);
+    let floors = caps.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c, *d], [d + count, c + count, b + count, a + count]]);
+    let corners: Vec<u32> = walls.chain(floors).flatten().collect();
+    Component::mesh(vec![4; corners.len() / 4], corners, points).unwrap()
+}
+
+/// The cube, of 0.1 m from the origin, where an L-shaped room has no inside, in its longer arm, across its inner wall, and
+/// with a face on that wall.
+#[test]
+fn a_room_is_what_its_faces_enclose() {
+    let beside = |[x, y]: [f32; 2]| {
+        let l = [[-0.3, -0.3], [0.3, -0.3], [0.3, 0.0], [0.0, 0.0], [0.0, 0.6], [-0.3, 0.6]];
+        let room = room(&l.map(|[u, v]| [u + x, v + y]), &[[0, 1, 2, 3], [0, 3, 4, 5]]);
+        let frame = simulating(cube()).input(COLLIDERS, room).frames([1]).remove(0);
+        assert_eq!(frame.metrics["started_inside"], 0.0, "{x} {y}: a room has no inside that bodies are pushed out of");
+        frame.metrics["inward_colliders"]
+    };
+    assert_eq!(beside([-0.05, -0.05]), 1.0, "in a corner of its bounds, beyond its faces");
+    assert_eq!((beside([0.2, -0.2]), beside([-0.15, 0.2])), (0.0, 0.0), "in either arm");
+    assert_eq!(beside([0.05, -0.2]), 1.0, "half of the cube is outside");
+    assert_eq!((beside([0.1, -0.2]), beside([0.0995, -0.2])), (0.0, 0.0), "at the wall, within `thickness`");
+    assert_eq!(beside([0.095, -0.2]), 1.0, "farther out than `thickness`");
+}
+
+/// Notes come in the order of the metrics.
+#[test]
+fn the_note_on_a_room_comes_before_the_one_on_what_went_through_its_faces() {
+    let place = |name: &str| NODE.metrics.iter().position(|metric| metric.name == name).unwrap();
+    assert!(place("inward_colliders") < place("deepest_penetration"));
+}
+
 /// Bars of 0.1 × 0.1 × 0.5 m through each other's middle, with cells of 0.1 m: all points lie on the other's faces or outside.
 #[test]
 fn bars_that_start_crossed_are_said_from_the_first_frame() {
