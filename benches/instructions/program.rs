@@ -1,5 +1,6 @@
 //! Runs of the program on a case's graph.
 
+use std::ffi::OsString;
 use std::path::Path;
 use std::process::Command;
 
@@ -53,7 +54,7 @@ impl Run {
         let profile = folder.path().join("profile");
         let mut valgrind = Command::new("valgrind");
         valgrind.args(["--tool=callgrind", &format!("--callgrind-out-file={}", profile.display())]);
-        self.cook(valgrind.arg(PROGRAM), folder.path(), &["--no-write"])?;
+        self.cook(valgrind.arg(program()), folder.path(), &["--no-write"])?;
         let text = std::fs::read_to_string(&profile).map_err(|error| format!("{}: {error}", profile.display()))?;
         let total = text.lines().find_map(|line| line.strip_prefix("totals: ")?.trim().parse().ok());
         total.ok_or_else(|| format!("{}: callgrind wrote no total", self.name))
@@ -62,7 +63,7 @@ impl Run {
     /// The text of each frame's file. It has the fewest digits that tell two numbers apart, so it is equal where all bits are.
     pub(crate) fn result(&self) -> Result<Vec<String>, String> {
         let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
-        self.cook(&mut Command::new(PROGRAM), folder.path(), &["--format", "json"])?;
+        self.cook(&mut Command::new(program()), folder.path(), &["--format", "json"])?;
         let read = |frame| {
             let path = folder.path().join(format!("out.{frame:04}.json"));
             std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))
@@ -83,5 +84,8 @@ impl Run {
     }
 }
 
-/// The program as it is shipped: linked for this, and for nothing else, it would take a minute.
-const PROGRAM: &str = env!("CARGO_BIN_EXE_convect");
+/// The program as it is shipped: linked for this, and for nothing else, it would take a minute. `CONVECT_PROGRAM` names one
+/// that is there already, so that the bench itself need not be compiled as that was.
+fn program() -> OsString {
+    std::env::var_os("CONVECT_PROGRAM").unwrap_or_else(|| env!("CARGO_BIN_EXE_convect").into())
+}
