@@ -21,7 +21,7 @@ use serde_json::Value;
 
 use crate::args::{Frames, PartRange, Setting, Size};
 use crate::failure::{Exit, Failure, cancelled_by_signal, exit_of_error};
-use crate::output::{Writers, Written, add_targets, create_folder, failed, fill};
+use crate::output::{Writers, Written, add_targets, create_folder, failed, fill, write_whole};
 use crate::pictures::{self, Pictures, Staged};
 use crate::progress::Progress;
 use crate::targets::Targets;
@@ -212,6 +212,13 @@ fn cook(
     writing += watch.wall();
     let mut reported = Ok(());
     if args.report.is_some() {
+        let tips = match tips_path(args).map(|path| write_tips(&path, &report)).transpose() {
+            Ok(tips) => tips.flatten(),
+            Err(failure) => {
+                reported = Err(failure);
+                None
+            }
+        };
         let cooked = report::Cooked {
             graph_path: load::graph_name(&args.graph),
             recipe,
@@ -220,12 +227,13 @@ fn cook(
             written: &written,
             threads: engine.threads(),
             writing,
+            tips: tips.as_deref(),
         };
         let text = serde_json::to_string_pretty(&report::to_json(&report, &cooked)).unwrap_or_default();
         let text = format!("{text}\n");
         match report_file {
             // What was written is said all the same.
-            Some(file) => reported = fill(file, text.as_bytes()),
+            Some(file) => reported = reported.and(fill(file, text.as_bytes())),
             None => reported = std::io::stdout().write_all(text.as_bytes()).map_err(Failure::from),
         }
     }
@@ -264,6 +272,25 @@ fn failed_together(ends: Vec<Result<(), Failure>>) -> Result<(), Failure> {
     all.map_or(Ok(()), Err)
 }
 
+/// Where a part keeps the tips of its first and last frame, which merge compares with those of its neighbours: beside its
+/// report.
+fn tips_path(args: &CookArgs) -> Option<PathBuf> {
+    let path = args.part.and(args.report.as_ref()).filter(|path| !is_stdout(path))?;
+    let mut name = path.clone().into_os_string();
+    name.push(".tips");
+    Some(name.into())
+}
+
+/// Writes the tips of a part, if a node has any; the name of the file.
+fn write_tips(path: &Path, report: &Report) -> Result<Option<String>, Failure> {
+    let tips = report.end_tips();
+    if tips.0.is_empty() {
+        return Ok(None);
+    }
+    write_whole(path, &tips.to_bytes())?;
+    Ok(path.file_name().map(|name| name.to_string_lossy().into_owned()))
+}
+
 /// Whether a report is to be written to stdout.
 fn is_stdout(path: &Path) -> bool {
     path == Path::new("-")
@@ -288,6 +315,9 @@ fn targets(args: &CookArgs, graph: &Graph, request: &Request, format: Format, pi
     pictures.iter().for_each(|pictures| pictures.add_targets(&mut targets));
     if let Some(path) = args.report.as_ref().filter(|path| !is_stdout(path)) {
         targets.writes("--report", Exit::CommandLine, path);
+    }
+    if let Some(path) = tips_path(args) {
+        targets.writes("--report", Exit::CommandLine, &path);
     }
     targets
 }

@@ -29,6 +29,8 @@ pub struct Cooked<'a> {
     pub threads: usize,
     /// Wall time of writing.
     pub writing: Duration,
+    /// The file beside the report that has the tips of the first and the last frame of a part.
+    pub tips: Option<&'a str>,
 }
 
 /// What a cook is by: the version of the program, a hash of the bytes of the graph's file, and what `--set` changed, by
@@ -74,7 +76,7 @@ pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
     let frames: Vec<Value> = cooked.frames.iter().take_while(was_reached).map(Frame::to_json).collect();
     let seconds = report.cooking.as_secs_f64();
     let delivered = report.delivered.values().copied().max().unwrap_or(0);
-    json!({
+    let mut json = json!({
         "report": 1,
         "graph": cooked.graph_path,
         "recipe": cooked.recipe,
@@ -94,7 +96,11 @@ pub fn to_json(report: &Report, cooked: &Cooked) -> Value {
             "from_disk": report.from_disk,
             "interrupted": report.cancelled,
         },
-    })
+    });
+    if let Some(tips) = cooked.tips {
+        json["tips"] = json!(tips);
+    }
+    json
 }
 
 fn node_to_json(node: &NodeReport) -> Value {

@@ -4,6 +4,7 @@ use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
+use engine::cook::NodeEndTips;
 use engine::time::Frame;
 use formats::atomic::FileError;
 use serde_json::{Map, Value, json};
@@ -16,6 +17,7 @@ use crate::failure::Failure;
 pub(super) struct PartReport {
     path: PathBuf,
     report: Value,
+    tips: NodeEndTips,
 }
 
 /// The reports of all parts, by the first frame of each.
@@ -55,7 +57,7 @@ pub(super) fn of(folder: &Path) -> Result<Vec<PartReport>, Failure> {
         let report: Value = serde_json::from_str(&text)
             .map_err(|error| Failure::file(format!("`{}` is no report: {error}", path.display())))?;
         match report["report"] == json!(1) {
-            true => Ok(PartReport { path, report }),
+            true => Ok(PartReport { tips: tips_of(&path, &report)?, path, report }),
             false => Err(Failure::file(format!("`{}` is not a report; cook its part again", path.display()))),
         }
     };
@@ -63,6 +65,15 @@ pub(super) fn of(folder: &Path) -> Result<Vec<PartReport>, Failure> {
     let first = |report: &PartReport| report.report["frames"][0].as_f64().unwrap_or_default();
     reports.sort_by(|a, b| first(a).total_cmp(&first(b)));
     Ok(reports)
+}
+
+/// The tips of the first and the last frame of a part, which lie beside its report.
+fn tips_of(path: &Path, report: &Value) -> Result<NodeEndTips, Failure> {
+    let Some(name) = report["tips"].as_str() else { return Ok(NodeEndTips::default()) };
+    let path = path.with_file_name(name.rsplit(['/', '\\']).next().unwrap_or_default());
+    let bytes = fs::read(&path).map_err(|error| Failure::file(FileError::new(&path, "read", error).to_string()))?;
+    let invalid = || Failure::file(format!("`{}` is damaged; cook its part again", path.display()));
+    NodeEndTips::from_bytes(&bytes).ok_or_else(invalid)
 }
 
 /// Refuses parts that were cooked by different graphs, settings or versions of the program. A part that does not say by
@@ -157,6 +168,10 @@ pub(super) fn merged(reports: &[PartReport]) -> Value {
         frames.dedup();
     }
     all["parts"] = json!(reports.len());
+    if let Some(all) = all.as_object_mut() {
+        all.remove("tips");
+    }
+    add_jumps(&mut all, reports);
     all["notes"] = notes::joined(reports.iter().map(|part| &part.report), &all);
     notes::sort_metrics(&mut all);
     let total = &all["total"];
@@ -164,6 +179,17 @@ pub(super) fn merged(reports: &[PartReport]) -> Value {
         / total["cooking_ms"].as_f64().unwrap_or(f64::INFINITY);
     all["total"]["frames_per_second"] = json!(rate);
     all
+}
+
+/// Adds the jumps at the first frame of each part, from the last one of the part before.
+fn add_jumps(all: &mut Value, reports: &[PartReport]) {
+    for (node, here) in reports.iter().flat_map(|report| &report.tips.0) {
+        let of_node = reports.iter().filter_map(|report| report.tips.0.get(node));
+        let before = of_node.filter(|ends| ends.last().number() + 1.0 == here.first().number()).next_back();
+        if let Some(share) = before.and_then(|before| here.jumps_since(before)) {
+            all["nodes"][node]["metrics"][here.metric()][here.first().to_string()] = json!(share);
+        }
+    }
 }
 
 /// Adds what another part says; `key` is the name under which both stand.

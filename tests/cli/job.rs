@@ -230,12 +230,17 @@ fn the_report_of_a_merge_is_that_of_the_whole() {
         r#"{"convect": 1, "scene": {"frames": [1, 12]}, "nodes": {
             "blade": {"type": "Curve_In", "params": {"points": [[0, 0, 0], [0, 0.3, 0.1]]}},
             "gusts": {"type": "Curve_Wind_Gusts", "inputs": {"curves": "blade"}, "params": {
-                "loop": 8, "start_frame_range": [1, 8], "life_range": [9, 9],
+                "loop": 8, "base": 0.5, "start_frame_range": [1, 8], "life_range": [9, 9],
                 "wind_dir": {"keyframes": [[1, [1, 0, 0]], [12, [0, 0, 1]]]}}},
-            "wind": {"type": "Curve_Wind", "inputs": {"curves": "gusts"}}}, "outputs": {"grass": "wind"}}"#,
+            "wind": {"type": "Curve_Wind", "inputs": {"curves": "gusts"}, "params": {
+                "global_rotate": {"keyframes": [[6, 0], [7, 1]]}}},
+            "ground": {"type": "Mesh_Primitive"},
+            "kept": {"type": "Curve_Wind_Collision",
+                "inputs": {"curves": "wind", "rest": "blade", "colliders": ["ground"]}}},
+            "outputs": {"grass": "kept"}}"#,
     );
     bench.done(&["cook", "g.json", "--out", "whole", "--report", "whole.json"]);
-    for part in ["1-5", "6-12"] {
+    for part in ["1-5", "6-6", "7-12"] {
         let folder = format!("farm/parts/{part}");
         bench.done(&["cook", "g.json", "--part", part, "--out", &folder, "--report", &format!("{folder}/report.json")]);
     }
@@ -249,10 +254,27 @@ fn the_report_of_a_merge_is_that_of_the_whole() {
         notes
     };
     assert_eq!(sorted(&whole), sorted(&merged));
-    for node in ["gusts", "wind"] {
+    for node in ["gusts", "wind", "kept"] {
         let [a, b] = [&whole, &merged].map(|report| report["nodes"][node]["metrics"].to_string());
         assert_eq!(a, b, "in order, too");
     }
+    // Also those that compare a part's first frame with the last one of the part before; the first frame has none.
+    let jumps = merged["nodes"]["kept"]["metrics"]["jumps"].as_object().unwrap();
+    assert_eq!(jumps.len(), 11);
+    assert_eq!((&jumps["6"], &jumps["7"]), (&json!(0.0), &json!(1.0)));
+    assert_eq!(merged["tips"], Value::Null);
+
+    bench.write("farm/parts/6-6/report.json.tips", "torn");
+    let ran = bench.run(&["merge", "farm"]);
+    let expected = "`farm/parts/6-6/report.json.tips` is damaged; cook its part again\n";
+    assert_eq!((ran.code, ran.stderr.as_str()), (Some(1), expected));
+    // A part whose tips are not known, as older ones.
+    let mut report = bench.read_json("farm/parts/6-6/report.json");
+    report.as_object_mut().unwrap().remove("tips").unwrap();
+    bench.write("farm/parts/6-6/report.json", &report.to_string());
+    bench.done(&["merge", "farm"]);
+    let merged = bench.read_json("farm/report.json");
+    assert_eq!(merged["nodes"]["kept"]["metrics"]["jumps"].as_object().unwrap().len(), 9);
 }
 
 #[test]

@@ -12,6 +12,7 @@ mod interpolate;
 mod report;
 mod store;
 mod sweep;
+mod tips;
 mod types;
 mod verify;
 mod warnings;
@@ -22,6 +23,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 pub use disk::DiskCache;
 pub use report::{NodeReport, Report};
+pub use tips::{EndTips, NodeEndTips};
 
 use crate::error::CookError;
 use crate::files::Files;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
+use super::tips::{EndTips, NodeEndTips};
 use crate::error::CookError;
 use crate::geometry::Name;
 use crate::node::LeftOut;
@@ -46,6 +47,8 @@ pub struct NodeReport {
     pub peak_bytes: usize,
     /// Metrics by name and frame.
     pub metrics: BTreeMap<&'static str, BTreeMap<Frame, f64>>,
+    /// The tips of its curves at the first and the last sample, if they are compared and the node varies.
+    pub ends: Option<EndTips>,
 }
 
 /// What a cook cost and what it published.
@@ -71,4 +74,12 @@ pub struct Report {
     pub cancelled: bool,
     /// What a user should know although it is no error.
     pub notes: Vec<Note>,
+}
+
+impl Report {
+    /// What neighbouring parts of the scene compare with this cook.
+    pub fn end_tips(&self) -> NodeEndTips {
+        let of = |node: &NodeReport| Some((node.id.as_ref()?.to_string(), node.ends.clone()?));
+        NodeEndTips(self.nodes.iter().filter_map(of).collect())
+    }
 }

@@ -3,18 +3,11 @@
 
 use std::collections::BTreeMap;
 
-use numerics::vector::{Vec3, length, sub};
-
 use super::Sweep;
-use crate::geometry::{Component, Geometry};
+use crate::cook::tips::{EndTips, Tips};
+use crate::geometry::Geometry;
 use crate::graph::Link;
 use crate::time::Frame;
-
-/// The share of its length by which a tip that jumps moves at least.
-const JUMP: f32 = 0.25;
-
-/// The tips of curves, and the lengths of the curves, metres.
-struct Tips(Vec<(Vec3, f32)>);
 
 /// What is known of one node.
 #[derive(Default)]
@@ -23,30 +16,8 @@ pub(super) struct Jumps {
     tips: BTreeMap<Frame, Tips>,
     /// The share of tips that jumped since the sample before.
     shares: BTreeMap<Frame, f64>,
-}
-
-impl Tips {
-    fn of(curves: &Component) -> Self {
-        let points = curves.positions();
-        let tip = |cvs: std::ops::Range<usize>| {
-            let cvs = &points[cvs];
-            let long = cvs.windows(2).map(|ends| length(sub(ends[1], ends[0]))).sum();
-            (cvs.last().copied().unwrap_or_default(), long)
-        };
-        Self(curves.runs().ranges().map(tip).collect())
-    }
-
-    /// The share of curves whose tips jumped since `before`; `None` if there are none, or they are not the same ones.
-    fn jumped_since(&self, before: &Self) -> Option<f64> {
-        if self.0.is_empty() || self.0.len() != before.0.len() {
-            return None;
-        }
-        let jumps = |((tip, long), (was, _)): &(&(Vec3, f32), &(Vec3, f32))| {
-            *long > 0.0 && length(sub(*tip, *was)) > JUMP * long
-        };
-        let jumped = self.0.iter().zip(&before.0).filter(jumps).count();
-        Some(jumped as f64 / self.0.len() as f64)
-    }
+    /// The first sample, and its tips.
+    first: Option<(Frame, Tips)>,
 }
 
 impl Sweep<'_, '_, '_> {
@@ -82,7 +53,10 @@ impl Sweep<'_, '_, '_> {
 
     /// Compares the frames of a slice, oldest first, with each other, and the first one with `before`.
     pub(super) fn compare_tips(&mut self, before: Option<Frame>, frames: &[Frame]) {
-        for Jumps { tips, shares } in self.nodes.iter_mut().map(|run| &mut run.jumps) {
+        for Jumps { tips, shares, first } in self.nodes.iter_mut().map(|run| &mut run.jumps) {
+            if before.is_none() {
+                *first = frames.first().and_then(|frame| Some((*frame, tips.get(frame)?.clone())));
+            }
             let mut before = before;
             for frame in frames {
                 if let (Some(now), Some(then)) = (tips.get(frame), before.and_then(|before| tips.get(&before)))
@@ -96,8 +70,9 @@ impl Sweep<'_, '_, '_> {
         }
     }
 
-    /// Adds the shares to the report.
+    /// Adds the shares to the report, and the tips at its ends.
     pub(super) fn report_jumps(&mut self) {
+        let last = self.plan.request.frames.last();
         for node in 0..self.nodes.len() {
             let Some(name) = self.metric_of_jumps(node) else { continue };
             let run = &mut self.nodes[node];
@@ -110,6 +85,8 @@ impl Sweep<'_, '_, '_> {
             if !shares.is_empty() {
                 run.report.metrics.insert(name, shares);
             }
+            let ends = run.jumps.first.take().zip(last.and_then(|last| Some((last, run.jumps.tips.remove(&last)?))));
+            run.report.ends = ends.filter(|_| run.report.varies).map(|(first, last)| EndTips::new(name, first, last));
         }
     }
 }
