@@ -190,9 +190,9 @@ metrics! { METRICS:
         .warn_last_outside(-0.03, 0.03, "This share of the liquid's volume was lost (below 0) or gained (above 0) up to this frame because \
             cells and substeps are too coarse. `volume_correction` has made good {volume_made_good} % of the volume, {made_good_now} % \
             in the frame alone: the volume as a whole is right, but some parts of the liquid are too thick and others too thin. Films, \
-            drops, sheets and jets of less than two cells are lost, and what overlaps where surfaces meet or liquid hits something. Where \
-            `resolution` is 1 and `cfl` 2, 2 and 1 leave a third to an eighth of the error, in four times the time. In a splash a smaller \
-            `cell` alone helps little.");
+            drops, sheets and jets of less than two cells are lost, and what overlaps where surfaces meet or liquid hits something. Away \
+            from colliders, sources, sinks and open walls most of it is given back where it was lost; near them, smaller cells, or \
+            `resolution` 2 with `cfl` 1, lose less.");
     MADE_GOOD = Metric::new("volume_made_good", Unit::Percent,
         "Volume that correction has added or removed since the start, in percent of the volume.");
     MADE_GOOD_NOW = Metric::new("made_good_now", Unit::Percent,
@@ -290,7 +290,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "FluidSolve",
-    16,
+    17,
     "Simulates a liquid, from water to honey to nearly rigid. It falls, splashes, sloshes, piles up and creeps. `viscosity` has \
      the same effect at any cell size and time step.",
     Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),

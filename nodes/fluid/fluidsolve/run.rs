@@ -279,8 +279,12 @@ impl Run {
             self.left_domain += if stays { 0.0 } else { drop.volume };
             stays
         });
+        let landed = rejoining(&mut self.spray, liquid.surface(), lattice.cell);
+        let unit = lattice.cell.powi(-3);
+        let owed: Vec<_> = landed.iter().map(|drop| (drop.place, (unit * drop.volume) as f32)).collect();
+        liquid.give(&owed);
         (self.surface, self.motion) = liquid.into_parts();
-        for drop in rejoining(&mut self.spray, &self.surface, lattice.cell) {
+        for drop in landed {
             self.targets.add_phase(drop.volume, drop.phase, Some(drop.place));
         }
         self.correct(cx, settings, &report, &air);

@@ -229,6 +229,10 @@ impl Surface for MarkedSurface {
         PhiView { rows: &self.rows, phi: &self.phi, outside: BAND / self.resolution as f32, low, high }
     }
 
+    fn finest_view(&self) -> (PhiView<'_>, i32) {
+        (self.set.view(), self.resolution)
+    }
+
     fn advance(&mut self, flow: &Moving<'_>, reach: f32) {
         let size = self.resolution as f32;
         let flow = Scaled { flow, size };
@@ -249,6 +253,7 @@ impl Surface for MarkedSurface {
             parallel::tabulate_with(points.len(), CHUNK, start, |by, n| size * by(scale(points[n].point, unit)));
         self.set.lower(&cells);
         self.markers.shift(&markers);
+        self.restrict();
     }
 
     fn meet(&mut self, solid: &Distance<'_>) {

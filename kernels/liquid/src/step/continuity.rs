@@ -9,6 +9,7 @@ use crate::step::Moving;
 use crate::step::domain::{Domain, Obstacle, share_outside};
 use crate::step::fullness::{Neighbours, fullness};
 use crate::step::motion::{Motion, hold_walls};
+use crate::step::shares::inner;
 use crate::velocity::{FaceFields, FaceMask, Sampler, Site};
 
 /// What a cell gains or loses in a substep, ÷ its volume, that is not worth a look.
@@ -128,13 +129,19 @@ impl<'a> Swelling<'a> {
             return None;
         }
         by.iter_mut().for_each(|by| *by = by.clamp(-MOST, MOST));
+        Some(Self::new(rows, by, domain))
+    }
+
+    /// By so many cells at the middle of each of `rows`.
+    pub(super) fn new(rows: &'a CellRows, mut by: Vec<f32>, domain: &Domain) -> Self {
+        let periods = domain.periods();
         periods.images(rows).fill(&mut by);
         let middle = |axis: usize, at: i32, side: f32| {
             if periods.0[axis] > 0 { side * f32::INFINITY } else { at as f32 - 0.5 * side }
         };
         let inner = [(domain.low, -1.0), (domain.high, 1.0)]
             .map(|(corner, side)| [0, 1, 2].map(|axis| middle(axis, corner[axis], side)));
-        Some(Self { rows, by, inner })
+        Self { rows, by, inner }
     }
 
     /// Cells outward at a place in cells. Fast where successive places are near each other.
@@ -206,12 +213,6 @@ impl CellFaces {
 /// To the n-th of `size`³ cells from the one in their middle, x fastest.
 fn offset(n: usize, size: usize) -> Cell {
     [n % size, n / size % size, n / size / size].map(|at| at as i32 - size as i32 / 2)
-}
-
-/// The cell of the domain that a cell repeats, or is next to.
-fn inner(domain: &Domain, cell: Cell) -> Cell {
-    let home = domain.periods().home(cell);
-    [0, 1, 2].map(|axis| home[axis].clamp(domain.low[axis], domain.high[axis] - 1))
 }
 
 /// φ around a cell; beyond the domain that of [`inner`].

@@ -98,7 +98,7 @@ impl Obstacle<'_> {
 
 impl Domain {
     /// A box of these cells with closed walls.
-    pub fn closed(low: Cell, high: Cell) -> Self {
+    pub const fn closed(low: Cell, high: Cell) -> Self {
         Self { low, high, walls: [[Wall::Closed; 2]; 3] }
     }
 

@@ -2,7 +2,7 @@
 //! carried along, forces added, and divergence driven out.
 //!
 //! Order of a substep: velocity continued past the liquid → surface moved, past solids as they are in the substep's middle; from
-//! here on they are where they are at its end → sources fill, sinks empty → velocity carried
+//! here on they are where they are at its end → the surface gains what it did not keep → sources fill, sinks empty → velocity carried
 //! onto the new liquid → gravity, read at the substep's middle → pressure, and viscosity
 //! with it ([`Coupling`]). The surface moves with a mean velocity of the substep, in which the flow has carried itself along for
 //! half of it; liquid that touches nothing has fallen for half of it, too, and falls by ½g·t² in substeps of any length.
@@ -45,7 +45,9 @@ mod part;
 mod passed;
 mod pour;
 mod project;
+mod remainder;
 mod shape_cells;
+mod shares;
 mod sources;
 mod stokes;
 mod substep;
@@ -59,7 +61,7 @@ pub use domain::{Domain, Solid, Wall};
 pub use motion::Motion;
 pub use outflow::Outflow;
 pub use sources::{AttributeEdit, FlowAccount, LiquidSink, LiquidSource, SourceShape};
-pub use substep::{Moving, Surface, Surroundings};
+pub use substep::{Moving, Owed, Surface, Surroundings};
 
 use self::exchange::Exchange;
 use self::sources::Span;
@@ -320,6 +322,14 @@ impl<S: Surface> Liquid<S> {
     /// Says what the liquid is made of at each place, in cells, instead of the same everywhere.
     pub fn set_materials(&mut self, material: impl Fn(Vec3) -> LiquidMaterial + Sync) {
         self.motion.materials = Some(MaterialPoints::filling(&self.surface.view(), material));
+    }
+
+    /// Moves the surface outward so that it gains these volumes, each in the part of the liquid where it is.
+    pub fn give(&mut self, owed: &[Owed]) {
+        let rows = self.surface.view().rows.clone();
+        if let Some(swelling) = remainder::given(&rows, &self.surface, &self.settings.domain, owed) {
+            self.surface.swell(&swelling);
+        }
     }
 
     /// The surface, and all else that the next frame depends on.

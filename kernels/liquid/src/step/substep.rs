@@ -14,7 +14,8 @@ use crate::step::motion::{Gain, LiquidCells, Motion, largest_of};
 use crate::step::outflow::outflow;
 use crate::step::passed::passed_over;
 use crate::step::project::{Materials, Projection};
-use crate::step::sources::{LiquidSink, LiquidSource, Span};
+use crate::step::remainder::{self, Others};
+use crate::step::sources::{LiquidSink, LiquidSource, SourceShape, Span};
 use crate::step::turned;
 use crate::step::{LiquidReport, LiquidSettings, Splitting};
 use crate::velocity::{Advection, Around, FaceFields, MacVelocity, Sampler, Slopes};
@@ -45,6 +46,11 @@ impl<'a> Surroundings<'a> {
     ) -> Self {
         Self { gravity, viscosity, solid: None, sources: &[], sinks: &[], cancelled: &|| false }
     }
+
+    /// The shapes of sources and sinks.
+    pub(super) fn shapes(&self) -> impl Iterator<Item = SourceShape<'a>> + use<'_, 'a> {
+        self.sources.iter().map(|source| source.shape).chain(self.sinks.iter().map(|sink| sink.shape))
+    }
 }
 
 /// The surface of a liquid.
@@ -54,6 +60,11 @@ pub trait Surface {
 
     /// Moves by a flow that moves nothing in the liquid farther than `reach` cells.
     fn advance(&mut self, flow: &Moving<'_>, reach: f32);
+
+    /// φ on the finest grid that there is, and how many of its cells lie along a cell's edge.
+    fn finest_view(&self) -> (PhiView<'_>, i32) {
+        (self.view(), 1)
+    }
 
     /// Moves outward; [`Surface::advance`] follows. A surface may do without, and change its volume.
     fn swell(&mut self, _swelling: &Swelling<'_>) {}
@@ -74,6 +85,9 @@ pub trait Surface {
     /// without.
     fn edit_attributes(&mut self, _edit: &(dyn Fn(Vec3, &mut [f32]) + Sync)) {}
 }
+
+/// Volume, ÷ cell³, that a surface is to gain at a place in cells.
+pub type Owed = (Vec3, f32);
 
 /// The ways of points in a substep.
 #[derive(Clone, Copy)]
@@ -177,12 +191,18 @@ pub(super) fn substep(
     let left_domain = outflow.iter().map(|outflow| outflow.volume).sum();
     motion.outflow.extend(outflow);
     motion.carry(&flow, surface.view(), settings);
+    let held = remainder::held(velocity.rows(), surface, &settings.domain);
     if let Some(swelling) = Swelling::of(&flow, &surface.view(), &settings.domain) {
         surface.swell(&swelling);
     }
     surface.advance(&flow, reach);
     if let Some(solid) = solid {
         surface.meet(&|point| solid.distance(point));
+    }
+    let shapes: Vec<_> = around.shapes().collect();
+    let others = Others { domain: &settings.domain, solid, shapes: &shapes, time: middle };
+    if let Some(swelling) = remainder::remainder(&flow, surface, &held, &others, reach) {
+        surface.swell(&swelling);
     }
     let passed =
         around.solid.map_or(0.0, |solid| passed_over(&surface.view(), motion, &settings.domain, &flow, (solid, times)));

@@ -354,8 +354,8 @@ fn assert_kept((mut liquid, mut targets): (Liquid<MarkedSurface>, VolumeTargets)
 #[test]
 fn a_breaking_dam_keeps_its_volume() {
     let last = assert_kept(tank(dam));
-    // What it would have been.
-    assert!(last.raw_drift < -0.01, "{last:?}");
+    // What it would have been (NUMERICS, closed box).
+    assert!(last.raw_drift.abs() < 0.03, "{last:?}");
 }
 
 #[test]
