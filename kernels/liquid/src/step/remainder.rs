@@ -1,6 +1,6 @@
 //! The liquid that a surface does not keep as it moves, given back in each region of it.
 
-use numerics::vector::{Vec3, add, scale, sub};
+use numerics::vector::{Vec3, scale, sub};
 
 use crate::level_set::floor;
 use crate::rows::{Cell, CellRows, Finder, Periods};
@@ -30,11 +30,31 @@ const LEAST_SURFACE: f64 = 1.0;
 /// Cells, besides its way, within which liquid comes in or goes by other ways: through an open side, a source or a sink.
 const BESIDE: f32 = 2.0;
 
-/// The volume of liquid in each of `rows` in the domain, ÷ that of a cell.
-pub(super) fn held(rows: &CellRows, surface: &dyn Surface, domain: &Domain) -> Vec<f32> {
-    let shares = Shares::of(surface, domain);
-    let [held] = rows.tabulate_with(|| shares.reader(), |share, cell, _| share(cell, [0.0]));
-    held
+/// The liquid in cells.
+pub(super) struct Held {
+    /// The volume in each, ÷ that of a cell.
+    volume: Vec<f32>,
+    /// Its middle, in cells.
+    middle: [Vec<f32>; 3],
+}
+
+impl Held {
+    /// That in each of `rows`.
+    pub(super) fn of(rows: &CellRows, surface: &dyn Surface, domain: &Domain) -> Self {
+        let shares = Shares::of(surface, domain);
+        let [volume, x, y, z] = rows.tabulate_with(
+            || shares.reader(),
+            |share, cell, _| {
+                let ([share], [x, y, z]) = share(cell, [0.0]);
+                [share, x, y, z]
+            },
+        );
+        Self { volume, middle: [x, y, z] }
+    }
+
+    fn middle(&self, at: usize) -> Vec3 {
+        [0, 1, 2].map(|axis| self.middle[axis][at])
+    }
 }
 
 /// What takes liquid away, brings some, or has its surface go on into it, in other ways than by its flow.
@@ -73,7 +93,7 @@ impl Others<'_> {
 pub(super) fn remainder<'a>(
     flow: &Moving<'a>,
     surface: &dyn Surface,
-    held: &[f32],
+    held: &Held,
     others: &Others<'_>,
     reach: f32,
 ) -> Option<Swelling<'a>> {
@@ -81,31 +101,33 @@ pub(super) fn remainder<'a>(
     let shares = Shares::of(surface, domain);
     // What is in each cell, where that was, what the cell gains by a way outward, ÷ that, and whether its regions are apart.
     let [now, x, y, z, gain, apart] = rows.tabulate_with(
-        || (shares.reader(), flow.centre_reader(), flow.reader()),
-        |(share, way_of_centre, way), cell, at| {
-            let [here, more, less] = share(cell, [0.0, WAY, -WAY]);
-            if more.max(held[at]) == 0.0 {
+        || (shares.reader(), flow.reader()),
+        |(share, way), cell, at| {
+            let ([here, more, less], middle) = share(cell, [0.0, WAY, -WAY]);
+            if more.max(held.volume[at]) == 0.0 {
                 return [0.0; 6];
             }
-            let place = Site::Centre.of(cell);
-            let halfway = add(place, scale(way_of_centre(cell), -0.5));
-            let [x, y, z] = sub(place, way(halfway));
+            let halfway = sub(middle, scale(way(middle), 0.5));
+            let [x, y, z] = sub(middle, way(halfway));
             let apart = if others.are_near(cell, reach + BESIDE) { 1.0 } else { 0.0 };
             [here, x, y, z, (more - less) / (2.0 * WAY), apart]
         },
     );
     let regions = Regions::of(rows, domain);
-    let (mut lack, mut near, mut near_start) = (Lack::none(&regions), regions.reader(), regions.reader());
+    let mut lack = Lack::none(&regions);
+    let [mut near, mut near_before, mut near_now] = [(); 3].map(|()| regions.reader());
     for (n, cell) in rows.iter().enumerate() {
-        if now[n].max(held[n]) == 0.0 && gain[n] == 0.0 {
+        if now[n].max(held.volume[n]) == 0.0 && gain[n] == 0.0 {
             continue;
         }
         for (at, weight) in near(Site::Centre.of(cell)) {
-            lack.volume[at] += weight * f64::from(held[n]);
             lack.area[at] += weight * f64::from(gain[n]);
             lack.is_apart[at] |= apart[n] > 0.0;
         }
-        for (at, weight) in near_start([x[n], y[n], z[n]]) {
+        for (at, weight) in near_before(held.middle(n)) {
+            lack.volume[at] += weight * f64::from(held.volume[n]);
+        }
+        for (at, weight) in near_now([x[n], y[n], z[n]]) {
             lack.volume[at] -= weight * f64::from(now[n]);
         }
     }
@@ -126,7 +148,7 @@ pub(super) fn given<'a>(
     let [gain] = rows.tabulate_with(
         || shares.reader(),
         |share, cell, _| {
-            let [more, less] = share(cell, [WAY, -WAY]);
+            let ([more, less], _) = share(cell, [WAY, -WAY]);
             [(more - less) / (2.0 * WAY)]
         },
     );
@@ -253,7 +275,7 @@ impl Lack {
 
 #[cfg(test)]
 mod tests {
-    use numerics::vector::length;
+    use numerics::vector::{add, length};
 
     use super::*;
     use crate::marked::MarkedSurface;
@@ -278,7 +300,7 @@ mod tests {
         let middle = [21.2, 22.1, 21.7];
         let rows = CellRows::cuboid(DOMAIN.low, DOMAIN.high);
         let before = ball(middle, 5.2);
-        let held = held(&rows, &before, &DOMAIN);
+        let held = Held::of(&rows, &before, &DOMAIN);
         let mut after = ball(add(middle, [1.5, 0.0, 0.0]), 5.0);
         let len = rows.len();
         let velocity = MacVelocity::new(rows, [vec![1.5; len], vec![0.0; len], vec![0.0; len]]);

@@ -1,12 +1,12 @@
 //! How much of cells is liquid.
 
-use numerics::vector::Vec3;
+use numerics::vector::{Vec3, add};
 
 use crate::level_set::PhiView;
 use crate::rows::{Cell, Finder};
 use crate::step::Surface;
 use crate::step::domain::Domain;
-use crate::velocity::trilinear;
+use crate::velocity::{Site, trilinear};
 
 /// Places along the edge of a surface cell where its share of liquid is looked at.
 const LOOKS: i32 = 2;
@@ -37,8 +37,9 @@ impl<'a> Shares<'a> {
     }
 
     /// The shares of a cell that are liquid if the surface moves outward by so many cells: by φ in the middle of 2³
-    /// parts of each surface cell, interpolated trilinearly. Fast where successive cells are near each other.
-    pub(super) fn reader<const N: usize>(&self) -> impl FnMut(Cell, [f32; N]) -> [f32; N] {
+    /// parts of each surface cell, interpolated trilinearly; and the middle of the first of them, in cells. Fast where successive
+    /// cells are near each other.
+    pub(super) fn reader<const N: usize>(&self) -> impl FnMut(Cell, [f32; N]) -> ([f32; N], Vec3) {
         let (coarse, looks, around) = (Finder::new(self.view.rows), self.looks(), self.around());
         let mut near = Vec::new();
         let per_cell = (LOOKS * self.fine) as f32;
@@ -46,17 +47,18 @@ impl<'a> Shares<'a> {
             let phi = coarse.find(cell).map_or(self.view.outside, |at| self.view.phi[at]);
             if phi.abs() > WHOLE || !self.domain.contains(cell) {
                 let is_whole = phi < 0.0 && self.domain.contains(cell);
-                return [if is_whole { 1.0 } else { 0.0 }; N];
+                return ([if is_whole { 1.0 } else { 0.0 }; N], Site::Centre.of(cell));
             }
             around(cell, &mut near);
-            let mut sums = [0.0; N];
+            let (mut sums, mut moment) = ([0.0; N], [0.0; 3]);
             for look in &looks {
                 let depth = -LOOKS as f32 * trilinear(look.corners.map(|corner| near[corner]), look.t);
-                for (sum, outward) in sums.iter_mut().zip(outward) {
-                    *sum += (0.5 + per_cell * outward + depth).clamp(0.0, 1.0);
-                }
+                let shares = outward.map(|outward| (0.5 + per_cell * outward + depth).clamp(0.0, 1.0));
+                (0..N).for_each(|n| sums[n] += shares[n]);
+                (0..3).for_each(|axis| moment[axis] += shares[0] * look.place[axis]);
             }
-            sums.map(|sum| sum / looks.len() as f32)
+            let middle = moment.map(|moment| moment / sums[0].max(f32::MIN_POSITIVE));
+            (sums.map(|sum| sum / looks.len() as f32), add(Site::Centre.of(cell), middle))
         }
     }
 
@@ -88,6 +90,7 @@ impl<'a> Shares<'a> {
             let [x, y, z] = from_first.map(|x| x as usize);
             let first = x + size * (y + size * z);
             Look {
+                place: along.map(|along| along / looks as f32 - 0.5),
                 corners: std::array::from_fn(|k| first + (k & 1) + size * ((k >> 1 & 1) + size * (k >> 2))),
                 t: from_first.map(f32::fract),
             }
@@ -98,6 +101,8 @@ impl<'a> Shares<'a> {
 
 /// A place where a cell is looked at.
 struct Look {
+    /// From the middle of the cell, in cells.
+    place: Vec3,
     /// The surface cells around it, of those of the cell and around it, and where between them.
     corners: [usize; 8],
     t: Vec3,
@@ -126,7 +131,7 @@ mod tests {
         let shares = Shares::of(&surface, &domain);
         let mut share = shares.reader();
         CellRows::cuboid(domain.low, domain.high).iter().fold([0.0; 2], |sums, cell| {
-            let shares = share(cell, [0.0, 0.1]);
+            let (shares, _) = share(cell, [0.0, 0.1]);
             [0, 1].map(|n| sums[n] + f64::from(shares[n]))
         })
     }
@@ -158,7 +163,7 @@ mod tests {
         let (shares, mut sum) = (Shares::of(&surface, &domain), 0.0);
         let mut share = shares.reader();
         for cell in CellRows::cuboid(domain.low, domain.high).dilated(2).iter() {
-            sum += share(cell, [0.0])[0];
+            sum += share(cell, [0.0]).0[0];
         }
         assert!((sum / (36.0 * 3.3) - 1.0).abs() < 1e-3, "{sum}");
     }

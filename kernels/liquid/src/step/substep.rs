@@ -191,7 +191,7 @@ pub(super) fn substep(
     let left_domain = outflow.iter().map(|outflow| outflow.volume).sum();
     motion.outflow.extend(outflow);
     motion.carry(&flow, surface.view(), settings);
-    let held = remainder::held(velocity.rows(), surface, &settings.domain);
+    let held = remainder::Held::of(velocity.rows(), surface, &settings.domain);
     if let Some(swelling) = Swelling::of(&flow, &surface.view(), &settings.domain) {
         surface.swell(&swelling);
     }
