@@ -67,6 +67,7 @@ impl Conformance {
         }
         let subject = Subject::new(self.node, self.samples);
         let tried = try_all(&subject);
+        tried.iter().for_each(|(trial, outcome)| subject.remember(trial, outcome));
         findings.effects_are_hidden = tried.iter().any(|(_, outcome)| errors::is_at_fault(outcome));
         errors::check(&subject, &tried, &mut findings);
         outputs::check(&subject, &tried, &mut findings);

@@ -27,6 +27,8 @@ pub(crate) struct Subject {
     pub(crate) inputs: Vec<InputSpec>,
     pub(crate) samples: Vec<Prepare>,
     reads: Vec<(String, Owner, ColumnType)>,
+    /// Hashes of outcomes by trial; see [`Subject::hash`].
+    hashes: Mutex<BTreeMap<String, ContentKey>>,
 }
 
 /// How inputs change with time.
@@ -116,7 +118,7 @@ fn with_engine<T>(threads: usize, cook: impl FnOnce(&Engine) -> T) -> T {
 impl Subject {
     pub(crate) fn new(node: &'static Node, samples: Vec<Prepare>) -> Self {
         let (specs, inputs, reads) = (node.param_specs(), node.input_specs(), samples::described(node.reads));
-        Self { node, specs, inputs, samples, reads }
+        Self { node, specs, inputs, samples, reads, hashes: Mutex::default() }
     }
 
     /// The frames that are cooked, chosen by how the node depends on time.
@@ -238,6 +240,22 @@ impl Subject {
     /// Cooks a trial at some frames.
     pub(crate) fn run(&self, trial: &Trial, frames: &[Frame]) -> Outcome {
         self.run_on(1, false, trial, frames)
+    }
+
+    /// Remembers the outcome of a trial at [`Subject::frames`] for [`Subject::hash`].
+    pub(crate) fn remember(&self, trial: &Trial, outcome: &Outcome) {
+        self.hashes.lock().unwrap_or_else(PoisonError::into_inner).insert(format!("{trial:?}"), outcome.whole());
+    }
+
+    /// The hash of the results and errors of a trial at [`Subject::frames`], which cooks each trial once. For checks of
+    /// what changes a result; that the same trial has the same result is checked by `determinism`.
+    pub(crate) fn hash(&self, trial: &Trial) -> ContentKey {
+        let known = self.hashes.lock().unwrap_or_else(PoisonError::into_inner).get(&format!("{trial:?}")).copied();
+        known.unwrap_or_else(|| {
+            let outcome = self.run(trial, &self.frames());
+            self.remember(trial, &outcome);
+            outcome.whole()
+        })
     }
 
     pub(crate) fn run_on(&self, threads: usize, reload: bool, trial: &Trial, frames: &[Frame]) -> Outcome {

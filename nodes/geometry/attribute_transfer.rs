@@ -237,7 +237,7 @@ mod tests {
     #[test]
     fn conforms_to_its_declaration() {
         let named = |bench: Bench| bench.set(ATTRIBUTES, names(&["width", "envelope"]));
-        conformance(&NODE).with(named).with(move |bench| named(bench).set(RADIUS, 0.5)).run();
+        conformance(&NODE).with(named).with(move |bench| named(bench).set(RADIUS, 0.06)).run();
     }
 
     #[test]

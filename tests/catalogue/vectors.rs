@@ -98,7 +98,10 @@ fn defined(source: &str) -> Vec<String> {
         found.extend(function(rest, &vectors).filter(|name| NAMES.contains(name)));
         // A term of a longer sum, or the last field of an operand.
         let is_part = at > 0 && ['+', '.'].map(Token::Mark).contains(&tokens[at - 1]);
-        let form = forms.iter().find(|(form, _)| {
+        // Most tokens begin no form: an operand goes on with a field, an index or a product.
+        let is_operand = rest[0].word().is_some() && matches!(rest.get(1), Some(Token::Mark('.' | '[' | '*')));
+        let begins = |form: &[Token]| if operand(&form[0]).is_some() { is_operand } else { form[0] == rest[0] };
+        let form = forms.iter().filter(|(form, _)| begins(form)).find(|(form, _)| {
             matches(form, rest, &mut Vec::new()).is_some_and(|end| rest.get(end) != Some(&Token::Mark('+')))
         });
         found.extend(form.filter(|_| !is_part).map(|(_, form)| *form));
@@ -152,10 +155,15 @@ fn closed(tokens: &[Token]) -> Option<&[Token]> {
     Some(&tokens[1..end])
 }
 
+/// The letter of a form that stands for an operand.
+fn operand(token: &Token) -> Option<char> {
+    token.word().and_then(|word| word.parse().ok()).filter(char::is_ascii_uppercase)
+}
+
 /// Where the form that begins here ends; each capital letter stands for one operand wherever it occurs.
-fn matches(form: &[Token], tokens: &[Token], bound: &mut Vec<(char, Vec<Token>)>) -> Option<usize> {
+fn matches<'t>(form: &[Token], tokens: &'t [Token], bound: &mut Vec<(char, &'t [Token])>) -> Option<usize> {
     let Some((first, rest)) = form.split_first() else { return Some(0) };
-    let Some(letter) = first.word().and_then(|word| word.parse().ok()).filter(char::is_ascii_uppercase) else {
+    let Some(letter) = operand(first) else {
         return (tokens.first()? == first).then(|| matches(rest, &tokens[1..], bound))?.map(|end| end + 1);
     };
     if let Some((_, operand)) = bound.iter().find(|(known, _)| *known == letter) {
@@ -163,7 +171,7 @@ fn matches(form: &[Token], tokens: &[Token], bound: &mut Vec<(char, Vec<Token>)>
         return tokens.starts_with(operand).then(|| matches(rest, &tokens[length..], bound))?.map(|end| end + length);
     }
     operands(tokens).into_iter().find_map(|length| {
-        bound.push((letter, tokens[..length].to_vec()));
+        bound.push((letter, &tokens[..length]));
         let end = matches(rest, &tokens[length..], bound);
         if end.is_none() {
             bound.pop();

@@ -442,7 +442,7 @@ fn pieces_of_a_surface_that_get_no_tets_are_noted() {
             }}, "outputs": {{"o": "body"}}}}"#
         ))
     };
-    assert_eq!(notes(&graph("[0.1, 0.1, 0.1]"), &[]), [""; 0]);
+    assert_eq!(notes(&graph("[0.5, 0.5, 0.5]"), &[]), [""; 0]);
     let found = notes(&graph("[1e-9, 1e-9, 1e-9]"), &[]);
     assert!(
         matches!(&found[..], [one] if one.starts_with("`body` (Tetrahedralize): `lost_pieces` is 1 at")),

@@ -43,6 +43,12 @@ pub(crate) fn has_solver(graph: &Graph) -> bool {
     graph.nodes.iter().filter_map(|node| node.node()).any(|node| matches!(node.cook, Cook::Solver(..)))
 }
 
+/// Whether a frame depends on frames before it.
+pub(crate) fn has_chain(graph: &Graph) -> bool {
+    let chain = |cook: &Cook| matches!(cook, Cook::Solver(..) | Cook::Window(..));
+    graph.nodes.iter().filter_map(|node| node.node()).any(|node| chain(&node.cook))
+}
+
 /// The scene's first frame, `last`, and the one in the middle.
 pub(crate) fn frames(graph: &Graph, last: i64) -> [Frame; 3] {
     let first = graph.scene.first;

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::thread;
 
-use bits::{Keys, cook, frames, graphs, has_solver, lines, load};
+use bits::{Keys, cook, frames, graphs, has_chain, has_solver, lines, load};
 use engine::cook::{DiskCache, Engine, Settings};
 use engine::graph::Graph;
 use engine::time::Frame;
@@ -31,17 +31,20 @@ fn cook_in_all_ways(path: &Path) -> String {
     let folder = tempfile::tempdir().unwrap();
     let cached = |state: &str| {
         let mut cache = DiskCache::open(folder.path(), u64::MAX);
-        (cook(&graph, &frames, 2, Some(&mut cache)), format!("{}: {state} cache", path.display()))
+        (cook(&graph, &frames, 1, Some(&mut cache)), format!("{}: {state} cache", path.display()))
     };
     let (expected, _) = cached("cold");
     let (warm, what) = cached("warm");
     assert_eq!(warm, expected, "{what}");
     let reversed: Vec<Frame> = frames.iter().rev().copied().collect();
-    assert_eq!(cook(&graph, &reversed, 1, None), expected, "{}: reversed, 1 thread", path.display());
-    let last = [frames[2]];
-    let alone: Keys =
-        expected.iter().filter(|((_, frame), _)| *frame == last[0]).map(|(at, key)| (at.clone(), *key)).collect();
-    assert_eq!(cook(&graph, &last, 7, None), alone, "{}: the last frame alone, 7 threads", path.display());
+    assert_eq!(cook(&graph, &reversed, 7, None), expected, "{}: reversed, 7 threads", path.display());
+    // Behind a chain the last frame takes as long as all of them; engine/tests cook frames of chains alone.
+    if !has_chain(&graph) {
+        let last = [frames[2]];
+        let alone: Keys =
+            expected.iter().filter(|((_, frame), _)| *frame == last[0]).map(|(at, key)| (at.clone(), *key)).collect();
+        assert_eq!(cook(&graph, &last, 2, None), alone, "{}: the last frame alone, 2 threads", path.display());
+    }
     lines(path, &expected)
 }
 

@@ -34,12 +34,11 @@ fn check_param(subject: &Subject, tried: &[(Trial, Outcome)], index: usize, find
     if spec.shape == Shape::Masked {
         let [low, high] = [0.35, 0.85].map(|share| between(subject, index, share));
         let pairs = [low, high].map(|x| [Value::Masked(x, None), Value::Masked(x, Some(MASK.into()))]);
-        let masked = trials(subject, tried, index).take(PAIRS).any(|(trial, _)| {
+        let masked = trials(subject, tried, index).take(PAIRS).any(|trial| {
             let masked = Trial { others: trial.others.or(Some(5)), ..trial };
             pairs.iter().any(|[plain, masked_by]| {
-                let frames = subject.frames();
-                let run = |value: &Value| subject.run(&masked.with(index, value.clone()), &frames).whole();
-                run(plain) != run(masked_by)
+                let hash = |value: &Value| subject.hash(&masked.with(index, value.clone()));
+                hash(plain) != hash(masked_by)
             })
         });
         if !masked {
@@ -75,30 +74,26 @@ pub(crate) fn trials<'t>(
     subject: &'t Subject,
     tried: &'t [(Trial, Outcome)],
     index: usize,
-) -> impl Iterator<Item = (Trial, Option<&'t Outcome>)> + 't {
+) -> impl Iterator<Item = Trial> + 't {
     let when = subject.specs[index].facts.when;
     let is_read = move |trial: &Trial| match when {
         None => true,
         Some(when) => subject.params(trial).is_some_and(|params| when(&params)),
     };
-    let at_hand = tried.iter().map(|(trial, outcome)| (trial.clone(), Some(outcome)));
-    let sought = (0..SOUGHT).map(|k| (suite::mixture(subject, 1_000 + k), None));
-    at_hand.chain(sought).filter(move |(trial, _)| is_read(trial))
+    let at_hand = tried.iter().map(|(trial, _)| trial.clone());
+    let sought = (0..SOUGHT).map(|k| suite::mixture(subject, 1_000 + k));
+    at_hand.chain(sought).filter(is_read)
 }
 
 fn matters(subject: &Subject, tried: &[(Trial, Outcome)], index: usize, values: &[Value]) -> bool {
-    let frames = subject.frames();
     if (0..subject.samples.len()).any(|sample| subject.prepared(sample).contains(&index)) {
         return prepared_matters(subject, index);
     }
     let mut pairs = 0;
-    for (trial, outcome) in trials(subject, tried, index) {
-        let before = match outcome {
-            Some(outcome) => outcome.whole(),
-            None => subject.run(&trial, &frames).whole(),
-        };
+    for trial in trials(subject, tried, index) {
+        let before = subject.hash(&trial);
         for value in values {
-            if subject.run(&trial.with(index, value.clone()), &frames).whole() != before {
+            if subject.hash(&trial.with(index, value.clone())) != before {
                 return true;
             }
             pairs += 1;
@@ -112,13 +107,9 @@ fn matters(subject: &Subject, tried: &[(Trial, Outcome)], index: usize, values: 
 
 /// Whether a sample without that param gives another result, or two samples give different results.
 fn prepared_matters(subject: &Subject, index: usize) -> bool {
-    let frames = subject.frames();
-    let run = |sample: usize| {
-        let trial = Trial { sample, ..subject.defaults(1) };
-        subject.run(&trial, &frames).whole()
-    };
-    let without = run(usize::MAX);
+    let hash = |sample: usize| subject.hash(&Trial { sample, ..subject.defaults(1) });
+    let without = hash(usize::MAX);
     (0..subject.samples.len())
         .filter(|sample| subject.prepared(*sample).contains(&index))
-        .any(|sample| run(sample) != without)
+        .any(|sample| hash(sample) != without)
 }

@@ -24,7 +24,7 @@ pub(crate) fn check(subject: &Subject, tried: &[(Trial, Outcome)], findings: &mu
             continue;
         }
         // A trial in which the param is read; if there is none, another promise reports it.
-        let Some((trial, _)) = params::trials(subject, tried, index).next() else { continue };
+        let Some(trial) = params::trials(subject, tried, index).next() else { continue };
         for RangeEnd { inside, outside } in ends {
             if let Some((fact, hint)) = spec.refuses(&inside) {
                 findings.add(format!("`{}` refuses {inside}, an end of its range: {fact}; {hint}", spec.name));

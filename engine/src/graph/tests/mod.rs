@@ -4,6 +4,7 @@ mod catalogue;
 mod faults;
 mod hostile;
 mod schema;
+mod validator;
 mod values;
 
 use std::io;

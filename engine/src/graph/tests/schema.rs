@@ -3,7 +3,6 @@
 use std::sync::LazyLock;
 
 use jsonc_parser::ast::Value as Ast;
-use jsonschema::Validator;
 use serde_json::{Value, json};
 
 use super::super::fault::code;
@@ -12,9 +11,9 @@ use super::super::syntax::parse;
 use super::super::text::Text;
 use super::CATALOGUE;
 use super::faults::cases;
+use super::validator;
 
-static VALIDATOR: LazyLock<Validator> =
-    LazyLock::new(|| jsonschema::draft202012::new(&schema(CATALOGUE)).expect("the schema is valid"));
+static SCHEMA: LazyLock<Value> = LazyLock::new(|| schema(CATALOGUE));
 
 /// Plain JSON of JSON with comments; of duplicate keys the first counts.
 fn plain(value: &Ast<'_>) -> Value {
@@ -35,12 +34,12 @@ fn plain(value: &Ast<'_>) -> Value {
 pub(super) fn refused(text: &str) -> Vec<String> {
     let text = Text::new(text, None);
     let value = plain(&parse(&text).expect("JSON with comments"));
-    VALIDATOR.iter_errors(&value).map(|error| format!("{}: {error}", error.instance_path())).collect()
+    validator::refused(&SCHEMA, &value)
 }
 
 #[test]
 fn the_schema_is_a_valid_schema() {
-    assert!(jsonschema::draft202012::meta::is_valid(&schema(CATALOGUE)));
+    assert_eq!(validator::faults(&SCHEMA), Vec::<String>::new());
 }
 
 #[test]
@@ -112,7 +111,7 @@ fn every_default_is_valid_under_its_own_schema() {
         for (name, param) in params.as_object().expect("params are an object") {
             let Some(default) = param.get("default") else { continue };
             let alone = json!({"$defs": schema["$defs"], "anyOf": [param]});
-            assert!(jsonschema::draft202012::is_valid(&alone, default), "{}.{name} = {default}", node.name);
+            assert_eq!(validator::refused(&alone, default), Vec::<String>::new(), "{}.{name} = {default}", node.name);
         }
     }
 }

@@ -208,7 +208,7 @@ fn extreme_speeds_and_steps_stay_finite() {
                 *v = (random(3, index) * speed).into();
             }
             let mut solver = BodySolver::new(&body);
-            for _ in 0..10 {
+            for _ in 0..4 {
                 let report =
                     solver.step(&body, &mut state, &SolverFrame { seconds, integrator, ..SolverFrame::default() });
                 assert!(is_finite(&state) && report.kinetic.is_finite(), "{integrator:?} {speed} {seconds}");

@@ -156,7 +156,8 @@ fn nearly_coplanar_and_cospherical_points_agree_with_the_oracle() {
 #[test]
 fn the_largest_coordinates_do_not_overflow() {
     let corners: Vec<GridPoint> = (0..8).map(|k| [k & 1, k >> 1 & 1, k >> 2].map(|bit| bit * SIDE)).collect();
-    for k in 0..8_usize.pow(5) {
+    // Every third of the 8⁵ choices: each corner at each place, beside each other one.
+    for k in (0..8_usize.pow(5)).step_by(3) {
         agree(std::array::from_fn(|n| corners[k / 8_usize.pow(n as u32) % 8]));
     }
 }

@@ -113,6 +113,7 @@ impl Fur {
         };
         let plain = collide(&self.starts, &self.rest, &self.goal, &how);
         let kept = at_rest(&self.starts, &self.rest, &how);
+        let described = format!("{plain:?}");
         for used in 0..3 {
             let with = collide(&self.starts, &self.rest, &self.goal, &Collide { at_rest: Some(&kept), ..how.clone() });
             for (cv, (a, b)) in plain.points.iter().zip(&with.points).enumerate() {
@@ -122,7 +123,7 @@ impl Fur {
                     "{name}, settings {settings}, use {used}, CV {cv}"
                 );
             }
-            assert_eq!(format!("{plain:?}"), format!("{with:?}"), "{name}, settings {settings}, use {used}");
+            assert_eq!(described, format!("{with:?}"), "{name}, settings {settings}, use {used}");
         }
         kept.half_spaces_found()
     }
@@ -164,7 +165,7 @@ pub(in crate::collide) fn bodies() -> Vec<(&'static str, Fur)> {
 fn what_is_kept_changes_no_bit() {
     for (name, fur) in bodies() {
         let mut found = 0;
-        for settings in 0..24 {
+        for settings in 0..12 {
             found += fur.keeps_its_bits(name, 1.0, settings * 7 + 1);
         }
         assert!(found > fur.starts.len(), "{name}: {found}");

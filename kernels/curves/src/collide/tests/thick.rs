@@ -103,7 +103,7 @@ fn random_hairs_keep_half_their_width_from_a_plane_and_a_sphere() {
     for (body, (points, triangles)) in bodies.iter().enumerate() {
         let tree = TriangleTree::build(points, triangles);
         let obstacles = [&tree];
-        let (starts, rest, goal) = blown(700, 6, |key| {
+        let (starts, rest, goal) = blown(250, 6, |key| {
             let [u, v, w] = [0, 1, 2].map(|k| 2.0 * key.of(k).f64() - 1.0);
             let up = DVec3::new(u, v, w).normalize();
             if body == 0 { [DVec3::new(u, 0.0062, v), DVec3::y()] } else { [up * 1.0062, up] }

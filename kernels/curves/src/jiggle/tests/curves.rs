@@ -180,7 +180,7 @@ fn curves_without_length_without_cvs_and_of_ten_thousand_cvs_work() {
     points.extend(&long);
     let starts = [0, 0, 1, 3, 6, 6, 10_006];
     let mut jiggle = Jiggle::at_rest(&starts, &points, &points);
-    for frame in 1..20 {
+    for frame in 1..9 {
         let targets: Vec<Vec3> = points.iter().map(|p| [p[0] + 0.1 * frame as f32 * p[1], p[1], p[2]]).collect();
         jiggle.step(&targets, &spring(0.5, 0.05, &ramp, Drag::World), 1.0, None);
         assert_kept(&starts, &targets, &jiggle.shape(1.0.into()).points);
