@@ -184,8 +184,8 @@ pub(super) fn merged(reports: &[PartReport]) -> Value {
 /// Adds the jumps at the first frame of each part, from the last one of the part before.
 fn add_jumps(all: &mut Value, reports: &[PartReport]) {
     for (node, here) in reports.iter().flat_map(|report| &report.tips.0) {
-        let of_node = reports.iter().filter_map(|report| report.tips.0.get(node));
-        let before = of_node.filter(|ends| ends.last().number() + 1.0 == here.first().number()).next_back();
+        let mut of_node = reports.iter().filter_map(|report| report.tips.0.get(node));
+        let before = of_node.rfind(|ends| ends.last().number() + 1.0 == here.first().number());
         if let Some(share) = before.and_then(|before| here.jumps_since(before)) {
             all["nodes"][node]["metrics"][here.metric()][here.first().to_string()] = json!(share);
         }

@@ -26,7 +26,7 @@ const TYPES: [&str; 7] = ["array", "boolean", "integer", "null", "number", "obje
 fn visit(root: &Value, schema: &Value, at: &str, faults: &mut Vec<String>) {
     let Some(object) = schema.as_object() else {
         if !schema.is_boolean() {
-            faults.push(format!("{at} is no schema"));
+            faults.push(format!("{at} is not a schema"));
         }
         return;
     };
