@@ -24,7 +24,11 @@ const NEAR: f32 = 4.0;
 /// How far a surface moves for what it has lost in a substep, cells, at most.
 const MOST: f64 = 0.25;
 
-/// The area of the surface in a region, ÷ cell², at least: what others lack comes to all.
+/// The area of the surface in a region, ÷ cell², of which it swells half as its volume says and half as the volume of it and
+/// those around does: that of little surface is not known well.
+const LITTLE_SURFACE: f64 = 32.0;
+
+/// The area, ÷ cell², of surface that anything can be given to.
 const LEAST_SURFACE: f64 = 1.0;
 
 /// Cells, besides its way, within which liquid comes in or goes by other ways: through an open side, a source or a sink.
@@ -199,6 +203,12 @@ impl Regions {
         Self { cells, width, periods }
     }
 
+    /// A region and those beside it, where they are stored.
+    fn around(&self, [x, y, z]: Cell) -> impl Iterator<Item = usize> {
+        let region = move |n: i32| self.periods.home([x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1]);
+        (0..27).filter_map(move |n| self.cells.find(region(n)))
+    }
+
     /// The regions around a place in cells, and their weights. Fast where successive places are near each other.
     fn reader(&self) -> impl FnMut(Vec3) -> [(usize, f64); 8] + use<'_> {
         let (mut last, mut at_corners) = ([i32::MIN; 3], [None; 8]);
@@ -238,6 +248,26 @@ impl Lack {
         Self { volume: vec![0.0; len], area: vec![0.0; len], is_apart: vec![false; len] }
     }
 
+    /// How far the surface in each region swells, in cells.
+    fn ways(&self, regions: &Regions) -> Vec<f64> {
+        let Self { volume, area, is_apart } = self;
+        let counted = || regions.cells.iter().enumerate().filter(|(at, _)| !is_apart[*at]);
+        let mut ways = vec![0.0; volume.len()];
+        let (mut left, mut surface) = (0.0, 0.0);
+        for (at, region) in counted() {
+            let beside = regions.around(region).filter(|at| !is_apart[*at]);
+            let (missing, room) =
+                beside.fold((0.0, 0.0), |(volumes, areas), at| (volumes + volume[at], areas + area[at]));
+            let usual = if room > LEAST_SURFACE { missing / room } else { 0.0 };
+            ways[at] = (volume[at] + LITTLE_SURFACE * usual) / (area[at] + LITTLE_SURFACE);
+            left += volume[at] - ways[at] * area[at];
+            surface += area[at];
+        }
+        let everywhere = left / f64::max(surface, LEAST_SURFACE);
+        counted().for_each(|(at, _)| ways[at] = (ways[at] + everywhere).clamp(-MOST, MOST));
+        ways
+    }
+
     /// How far the surface swells; `None` where nothing is missing.
     fn swelling<'a>(
         &self,
@@ -246,15 +276,7 @@ impl Lack {
         surface: &dyn Surface,
         domain: &Domain,
     ) -> Option<Swelling<'a>> {
-        let Self { volume, area, is_apart } = self;
-        let counted = (0..volume.len()).filter(|at| !is_apart[*at]);
-        let (on_surface, elsewhere): (Vec<_>, Vec<_>) = counted.partition(|at| area[*at] > LEAST_SURFACE);
-        let of = |sums: &[f64], all: &[usize]| all.iter().fold(0.0, |sum, at| sum + sums[*at]);
-        let everywhere = of(volume, &elsewhere) / of(area, &on_surface).max(LEAST_SURFACE);
-        let mut ways = vec![0.0; volume.len()];
-        for at in on_surface {
-            ways[at] = (volume[at] / area[at] + everywhere).clamp(-MOST, MOST);
-        }
+        let ways = self.ways(regions);
         if ways.iter().all(|way| *way == 0.0) {
             return None;
         }
