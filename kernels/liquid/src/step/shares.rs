@@ -14,8 +14,9 @@ const WHOLE: f32 = 1.0;
 /// How far from the middle of a surface cell, in surface cells along each axis, the 2³ places are where it is looked at.
 const ASIDE: f32 = 0.25;
 
-/// The curvature, ÷ surface cell, at most: a crease, as in the middle of a film, is none.
-const MOST_CURVED: f32 = 1.0;
+/// |φ″| along an axis, ÷ surface cell, up to which φ is curved, and from which on it is creased, as in the middle of a film.
+const CURVED: f32 = 0.75;
+const CREASED: f32 = 1.0;
 
 /// The cell of the domain that a cell repeats, or is next to.
 pub(super) fn inner(domain: &Domain, cell: Cell) -> Cell {
@@ -107,9 +108,13 @@ impl<'a> Shares<'a> {
 /// are, along each axis.
 fn parts(phi: &[f32], at: usize, steps: [usize; 3]) -> [f32; 8] {
     // Linear interpolation is too high where φ is curved, by ½ t (1 − t) φ″ along each axis: by 3/32 φ″ here. That the share of a part
-    // changes over half a cell along φ makes curved liquid larger by 1/96 φ″.
-    let curved = steps.iter().fold(0.0, |sum, step| sum + phi[at - step] + phi[at + step] - 2.0 * phi[at]);
-    let too_high = curved.clamp(-MOST_CURVED, MOST_CURVED) / 12.0;
+    // changes over half a cell along φ makes curved liquid larger by 1/96 φ″. Neither is true of a crease.
+    let curved: f32 = steps
+        .iter()
+        .map(|step| phi[at - step] + phi[at + step] - 2.0 * phi[at])
+        .map(|bend| bend * ((CREASED - bend.abs()) / (CREASED - CURVED)).clamp(0.0, 1.0))
+        .sum();
+    let too_high = curved / 12.0;
     std::array::from_fn(|part| {
         let beside = |at: usize, axis: usize| if part >> axis & 1 == 1 { at + steps[axis] } else { at - steps[axis] };
         let corners =
