@@ -280,8 +280,8 @@ impl Run {
             stays
         });
         let landed = rejoining(&mut self.spray, liquid.surface(), lattice.cell);
-        let unit = lattice.cell.powi(-3);
-        let owed: Vec<_> = landed.iter().map(|drop| (drop.place, (unit * drop.volume) as f32)).collect();
+        let in_cells = |volume: f64| (volume / (lattice.cell * lattice.cell * lattice.cell)) as f32;
+        let owed: Vec<_> = landed.iter().map(|drop| (drop.place, in_cells(drop.volume))).collect();
         liquid.give(&owed);
         (self.surface, self.motion) = liquid.into_parts();
         for drop in landed {
