@@ -32,7 +32,7 @@ const THICK: f64 = 100.0;
 
 /// What is in the box.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Scene {
+pub(crate) enum Scene {
     /// A block of 0.4 × 0.6 × 0.4 m in the middle of the floor, which collapses.
     Block,
     /// 5 % of the box, turning about y.
@@ -255,25 +255,6 @@ pub(crate) fn memory(extent: Extent, table: &mut Table) {
     table.add(format!("{}, peak memory", case.name()), cost.peak, Some(MEMORY), " MB", cost.beside());
 }
 
-/// The volume that the block's splash loses or gains without correction, by how fine its surface and its substeps are.
-pub(crate) fn volume(extent: Extent, table: &mut Table) {
-    let (cells, last) = extent.choose((24.0, 18), (32.0, 40));
-    let engine = Engine::new(&Settings { threads: 2, ..Settings::default() }).expect("threads");
-    for (resolution, cfl) in [(1, 2.0), (1, 1.0), (2, 2.0), (2, 1.0), (3, 1.0)] {
-        let more = format!(r#", "volume_correction": false, "resolution": {resolution}, "cfl": {cfl}"#);
-        let report = cook(&engine, &graph(Scene::Block, cells, 0.0, &more, last), last);
-        let drift = metric(&report, "volume_drift_raw");
-        let worst = drift.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or_default();
-        table.add(
-            format!("block, {cells}³ cells, `resolution` {resolution}, `cfl` {cfl}: worst volume in {last} frames"),
-            100.0 * worst,
-            None,
-            " %",
-            format!("{:.0} ms a frame", report.cooking.as_secs_f64() * 1e3 / (last - 1) as f64),
-        );
-    }
-}
-
 /// The argument before a case that makes this program a child process of [`Case::run`].
 pub(crate) const CHILD: &str = "cook-a-case";
 
@@ -310,12 +291,12 @@ pub(crate) fn cook_as_child(case: &str) {
 }
 
 /// A metric of FluidSolve in the frames after the first.
-fn metric(report: &Report, name: &str) -> Vec<f64> {
+pub(crate) fn metric(report: &Report, name: &str) -> Vec<f64> {
     let values = report.nodes.iter().find_map(|node| node.metrics.get(name)).expect("a metric of FluidSolve");
     values.iter().filter(|(frame, _)| **frame > Frame::whole(1)).map(|(_, value)| *value).collect()
 }
 
-fn cook(engine: &Engine, graph: &Graph, last: i64) -> Report {
+pub(crate) fn cook(engine: &Engine, graph: &Graph, last: i64) -> Report {
     let request = Request { outputs: vec![0], frames: (1..=last).map(Frame::whole).collect() };
     let mut sink = |_: &[Delivered]| -> Result<(), Infallible> { Ok(()) };
     let report = engine.cook(graph, &request, None, &AtomicBool::new(false), &mut sink).expect("it cooks");
@@ -324,7 +305,7 @@ fn cook(engine: &Engine, graph: &Graph, last: i64) -> Report {
 }
 
 /// FluidSolve with the liquid of a scene; `more`: other params, after a comma.
-fn graph(scene: Scene, cells: f64, viscosity: f64, more: &str, last: i64) -> Graph {
+pub(crate) fn graph(scene: Scene, cells: f64, viscosity: f64, more: &str, last: i64) -> Graph {
     let liquid = scene.liquid();
     let names: Vec<String> = (0..liquid.len()).map(|n| format!("liquid{n}")).collect();
     let given: String = names.iter().map(|name| format!(r#""{name}": {{ "type": "Mesh_Primitive" }},"#)).collect();
@@ -347,15 +328,19 @@ fn graph(scene: Scene, cells: f64, viscosity: f64, more: &str, last: i64) -> Gra
         1.0 / cells,
         scene.params()
     );
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut graph =
-        Graph::load(&text, folder, convect::CATALOGUE, &[], &probe).unwrap_or_else(|faults| panic!("{}", faults[0]));
+    let mut graph = load(&text);
     for (name, mesh) in names.iter().zip(liquid) {
         let geometry: Geometry = mesh.into();
         let node = graph.nodes.iter_mut().find(|node| *node.id == **name).expect("a node");
         node.body = Body::Given { at: Arc::new(move |_| geometry.clone()), moves: false };
     }
     graph
+}
+
+/// A graph of the bench's own.
+pub(crate) fn load(text: &str) -> Graph {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    Graph::load(text, folder, convect::CATALOGUE, &[], &probe).unwrap_or_else(|faults| panic!("{}", faults[0]))
 }
 
 /// A closed box of quads.

@@ -14,6 +14,7 @@ mod surface;
 mod table;
 #[path = "../timing/mod.rs"]
 mod timing;
+mod volume;
 
 use std::process::ExitCode;
 
@@ -49,7 +50,7 @@ const PARTS: [(&str, Measure); 9] = [
     ("growth", frames::growth),
     ("threads", frames::threads),
     ("memory", frames::memory),
-    ("volume", frames::volume),
+    ("volume", volume::raw),
     ("pressure", pressure::solves),
     ("surface", surface::extraction),
     ("tracking", surface::tracking),

@@ -1,7 +1,8 @@
 //! Attributes of new markers, from the markers around them on the same side of the liquid.
 
 use numerics::parallel;
-use numerics::vector::{DMat3, DVec3, dot, sub, to_f64};
+use numerics::point_tree::PointTree;
+use numerics::vector::{DMat3, DVec3, Vec3, dot, sub, to_f64};
 
 use super::bins::Bins;
 use super::{Marker, ONE_SIDED, one_sided};
@@ -12,10 +13,13 @@ use crate::rows::CellRows;
 const RINGS: [i32; 3] = [1, 2, 4];
 /// Neighbours that are enough, if they lie all around.
 const ENOUGH: usize = 6;
+/// Of a marker that has no neighbours, so many of the nearest markers are asked whether they are on its side.
+const NEAREST: usize = 12;
 /// New markers that a thread handles at a time.
 const CHUNK: usize = 32;
 
-/// For each attribute, its values at the markers `new`, within those of all markers. 0 where there are no neighbours.
+/// For each attribute, its values at the markers `new`, within those of all markers. One that has no neighbours, as on a drop that
+/// has just become liquid again, has the values of the nearest marker; 0 where there is none.
 pub(super) fn interpolate(
     rows: &CellRows,
     bins: &Bins,
@@ -26,7 +30,13 @@ pub(super) fn interpolate(
     if attributes.is_empty() {
         return Vec::new();
     }
-    let weights = parallel::tabulate(new.len(), CHUNK, |n| weights(rows, bins, markers, &new[n]));
+    let mut weights = parallel::tabulate(new.len(), CHUNK, |n| weights(rows, bins, markers, &new[n]));
+    if !markers.is_empty() && weights.iter().any(Vec::is_empty) {
+        let places: Vec<Vec3> = markers.iter().map(|marker| marker.point).collect();
+        let tree = PointTree::new(&places);
+        let alone = weights.iter_mut().zip(new).filter(|(weights, _)| weights.is_empty());
+        alone.for_each(|(weights, new)| weights.extend(nearest(&tree, markers, new).map(|n| (n, 1.0))));
+    }
     let value = |values: &[f32], [low, high]: [f32; 2], weights: &[(u32, f32)]| {
         let [least, most] = range(weights.iter().map(|(n, _)| values[*n as usize]));
         let half = 0.5 * (most - least);
@@ -56,6 +66,14 @@ fn weights(rows: &CellRows, bins: &Bins, markers: &[Marker], new: &Marker) -> Ve
         }
     }
     linear_fit(markers, new, near)
+}
+
+/// The nearest marker on the side of `new`, or the nearest of all.
+fn nearest(tree: &PointTree, markers: &[Marker], new: &Marker) -> Option<u32> {
+    let mut near = Vec::new();
+    tree.nearest(new.point, NEAREST, &mut near);
+    let of_side = near.iter().find(|found| dot(markers[found.number as usize].normal, new.normal) > 0.0);
+    Some(of_side.or(near.first())?.number)
 }
 
 /// The markers at most `ring` cubes away whose normals are less than 90° from that of `new`, with their weights: less

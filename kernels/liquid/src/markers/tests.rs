@@ -221,6 +221,20 @@ fn both_sides_of_a_sheet_keep_their_own_attributes() {
 }
 
 #[test]
+fn markers_far_from_all_others_have_the_attributes_of_the_nearest() {
+    let balls = |p: Vec3| f32::min(ball([8.0; 3], 4.0)(p), ball([24.0, 8.0, 8.0], 3.0)(p));
+    let set = made([32, 16, 16], balls);
+    let mut markers = Markers::new(&made([32, 16, 16], ball([8.0; 3], 4.0)), 1, 3);
+    let old = markers.ids.len();
+    markers.attributes[0] = markers.markers.iter().map(|marker| marker.point[0]).collect();
+    markers.upkeep(&set);
+    let all = markers.markers.iter().zip(&markers.attributes[0]);
+    let far: Vec<f32> = all.filter(|(marker, _)| marker.point[0] > 20.0).map(|(_, value)| *value).collect();
+    assert!(far.len() > 50 && markers.ids.len() >= old + far.len(), "{} new markers", far.len());
+    assert!(far.iter().all(|value| (6.0..12.1).contains(value)), "{far:?}");
+}
+
+#[test]
 fn markers_are_thinned_and_dropped() {
     let set = made([20; 3], |[_, y, _]| y - 10.2);
     let mut markers = Markers::new(&set, 0, 3);

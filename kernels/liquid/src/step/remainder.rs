@@ -24,8 +24,8 @@ const NEAR: f32 = 4.0;
 /// How far a surface moves for what it has lost in a substep, cells, at most.
 const MOST: f64 = 0.25;
 
-/// The area of the surface in a region, ÷ cell², of which it swells half as its volume says and half as the volume of it and
-/// those around does: that of little surface is not known well.
+/// A region with this area of surface, ÷ cell², moves it half by what it lacks itself, half by what it and its neighbours lack
+/// together. With less area the neighbours count for more: what few cells lack is mostly noise.
 const LITTLE_SURFACE: f64 = 32.0;
 
 /// The area, ÷ cell², of surface that anything can be given to.

@@ -106,6 +106,28 @@ fn a_source_has_a_liquid_of_its_own() {
     assert!(right * 10 > rows.len() * 9, "{right} of {}", rows.len());
 }
 
+/// A source far from all other liquid brings no value but its own.
+#[test]
+fn attributes_stay_within_those_that_came_in() {
+    let heated = |mut mesh: Component, heat: f32| {
+        let count = mesh.point_count();
+        mesh.set(HEAT, vec![heat; count]).unwrap();
+        mesh
+    };
+    let nozzle = with(ball([0.5, 0.75, 0.5], 0.08), &[(SOURCE_RATE, 0.02), (SOURCE_VISCOSITY, 40.0)]);
+    let bench = solving(heated(cuboid([-1.0; 3], [2.0, 0.2, 2.0]), 0.5)).input(SOURCES, heated(nozzle, 0.75));
+    for frame in 1..=8 {
+        let particles = particles_at(&bench, frame);
+        let heat = of_kind(&particles, 0, HEAT);
+        assert!(heat.iter().all(|heat| (0.4999..0.7501).contains(heat)), "{frame}: {heat:?}");
+        let all = of_kind(&particles, 0, P).into_iter().zip(heat);
+        let jet: Vec<f32> = all.filter(|(p, _)| p[1] > 0.5).map(|(_, heat)| heat).collect();
+        let of_source = jet.iter().filter(|heat| **heat > 0.74).count();
+        assert!(frame < 6 || jet.len() > 20, "{frame}: {}", jet.len());
+        assert!(of_source * 20 >= jet.len() * 19, "{frame}: {of_source} of {}", jet.len());
+    }
+}
+
 /// The heavier of two balls in a pool sinks, the lighter rises.
 #[test]
 fn heavy_liquid_sinks_and_light_liquid_rises() {
