@@ -198,16 +198,14 @@ metrics! { METRICS:
     MADE_GOOD_NOW = Metric::new("made_good_now", Unit::Percent,
         "Volume that correction added or removed in the frame, in percent of the volume.");
     VOLUME_DRIFT = Metric::new("volume_drift", Unit::None, "Relative error of the volume that remains after correction.")
-        .warn_outside(-0.01, 0.01, "The volume of the liquid is off by more than a hundredth at these frames. With \
-            `volume_correction` the surface moves by a tenth to half a cell in a frame to make it good, where there is room: drops and \
-            thin films take several frames, and where a box is full or colliders enclose the liquid, it stays off. Without \
-            `volume_correction` it stays off, too.");
+        .warn_outside(-0.01, 0.01, "The volume of the liquid is off by more than a hundredth at these frames: there are {volume} m³ of liquid and \
+            {spray} of spray after {sourced} came from sources, {sunk} sank and {left_domain} left. With `volume_correction` the surface \
+            moves by a tenth to half a cell in a frame to make it good, where there is room: drops and thin films take several frames, and \
+            where a box is full or colliders enclose the liquid, it stays off. Without `volume_correction` it stays off, too; lower `cell`, or \
+            raise `resolution`, where colliders or sheets of liquid are thinner than two cells.");
     VOLUME_BALANCE = Metric::new("volume_balance", Unit::None,
         "Relative difference between `volume` + `spray` + `sunk` + `left_domain` and the volume at the start + \
-            `sourced`: 0 if no volume is unaccounted for.")
-        .warn_outside(-0.01, 0.01, "Liquid was lost or gained: the sum of all volumes is off by {volume_balance} of what there should be. There are \
-            {volume} m³ of liquid, {spray} of spray, {sunk} sunk, {left_domain} left, {sourced} sourced. Raise `resolution`, or lower \
-            `cell` where colliders or sheets of liquid are thinner than two cells.");
+            `sourced`: 0 if no volume is unaccounted for. Beyond a hundredth, `volume_drift` is, too, and has a note.");
     MATERIAL_DRIFT = Metric::new("material_drift", Unit::None,
         "Where liquids of several viscosities or densities meet: the largest relative error of any one liquid's share of \
             the volume.")
