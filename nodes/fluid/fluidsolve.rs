@@ -188,8 +188,8 @@ metrics! { METRICS:
     VOLUME_DRIFT_RAW = Metric::new("volume_drift_raw", Unit::None,
         "Relative error that the volume would have if it had never been corrected.")
         .warn_last_outside(-0.03, 0.03, "This share of the liquid's volume was lost (below 0) or gained (above 0) up to this frame because \
-            cells and substeps are too coarse. `volume_correction` has made good {volume_made_good} % of the volume, {made_good_now} % \
-            in the frame alone: the volume as a whole is right, but some parts of the liquid are too thick and others too thin. Films, \
+            cells and substeps are too coarse. Of the volume, `volume_correction` has made good {volume_made_good} %, {made_good_now} % in the \
+            frame alone. Where it is on, the volume as a whole is right, but some parts of the liquid are too thick and others too thin. Films, \
             drops, sheets and jets of less than two cells are lost, and what overlaps where surfaces meet or liquid hits something. Away \
             from colliders, sources, sinks and open walls most of it is given back where it was lost; near them, smaller cells, or \
             `resolution` 2 with `cfl` 1, lose less.");
