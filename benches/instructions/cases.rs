@@ -44,6 +44,11 @@ const DOUGH: &str = r#"
 const ROLLER: &str = r#"
     "wood": { "type": "Mesh_Primitive", "params": { "shape": "cylinder", "size": [0.06, 0.6, 0.06], "divisions": 8 } },"#;
 
+/// A block of liquid in a box, which collapses.
+const BLOCK: &str = r#"
+    "block": { "type": "Mesh_Primitive", "params": { "size": [0.4, 0.6, 0.4] } },
+    "placed": { "type": "Transform", "inputs": { "geometry": "block" }, "params": { "translate": [0.5, 0.3, 0.5] } },"#;
+
 pub(crate) const CASES: &[Case] = &[
     Case { name: "Curve_Scatter", nodes: &[FUR], before: &["ball"], output: "fur", frames: 1 },
     Case {
@@ -246,5 +251,27 @@ pub(crate) const CASES: &[Case] = &[
         before: &["body", "wood"],
         output: "node.tets",
         frames: 5,
+    },
+    Case {
+        name: "FluidSolve, a block of water",
+        nodes: &[
+            BLOCK,
+            r#""node": { "type": "FluidSolve", "inputs": { "liquid": ["placed"] }, "params": {
+                   "cell": 0.05, "domain_from": [0, 0, 0], "domain_to": [1, 1, 1], "viscosity": 0 } }"#,
+        ],
+        before: &["placed"],
+        output: "node",
+        frames: 10,
+    },
+    Case {
+        name: "FluidSolve, a block of honey",
+        nodes: &[
+            BLOCK,
+            r#""node": { "type": "FluidSolve", "inputs": { "liquid": ["placed"] }, "params": {
+                   "cell": 0.05, "domain_from": [0, 0, 0], "domain_to": [1, 1, 1], "viscosity": 10, "density": 1400 } }"#,
+        ],
+        before: &["placed"],
+        output: "node",
+        frames: 4,
     },
 ];

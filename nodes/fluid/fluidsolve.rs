@@ -190,8 +190,8 @@ metrics! { METRICS:
         .warn_last_outside(-0.03, 0.03, "This share of the liquid's volume was lost (below 0) or gained (above 0) up to this frame because \
             cells and substeps are too coarse. Of the volume, `volume_correction` has made good {volume_made_good} %, {made_good_now} % in the \
             frame alone. Where it is on, the volume as a whole is right, but some parts of the liquid are too thick and others too thin. Films, \
-            drops, sheets and jets of less than two cells are lost, and what overlaps where surfaces meet or liquid hits something. Away \
-            from colliders, sources, sinks and open walls most of it is given back where it was lost; near them, smaller cells, or \
+            drops, sheets and jets thinner than two cells lose volume, and so does liquid where it hits a wall, a collider or other liquid. \
+            Away from colliders, sources, sinks and open walls most of it is given back where it was lost; near them, smaller cells, or \
             `resolution` 2 with `cfl` 1, lose less.");
     MADE_GOOD = Metric::new("volume_made_good", Unit::Percent,
         "Volume that correction has added or removed since the start, in percent of the volume.");
@@ -288,7 +288,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "FluidSolve",
-    18,
+    19,
     "Simulates a liquid, from water to honey to nearly rigid. It falls, splashes, sloshes, piles up and creeps. `viscosity` has \
      the same effect at any cell size and time step.",
     Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),

@@ -191,6 +191,19 @@ impl CellRows {
         row.get(row.partition_point(|span| span.end <= x)).filter(|span| span.contains(x))
     }
 
+    /// The span that holds a cell, or the gap between spans that does, which is [`NOWHERE`].
+    fn span_or_gap(&self, [x, y, z]: Cell) -> RowSpan {
+        let row = self.row(y, z);
+        let after = row.partition_point(|span| span.end <= x);
+        match row.get(after) {
+            Some(span) if span.start <= x => *span,
+            next => {
+                let start = if after > 0 { row[after - 1].end } else { i32::MIN };
+                RowSpan { start, end: next.map_or(i32::MAX, |next| next.start), base: NOWHERE }
+            }
+        }
+    }
+
     /// The rows that hold cells, with y and z, in the order of fields.
     pub fn rows(&self) -> impl Iterator<Item = ([i32; 2], &[RowSpan])> {
         self.rows_of(0..self.size[1])
@@ -399,6 +412,12 @@ impl CellRows {
         out
     }
 
+    /// What `of` makes of each of about `count` stretches of cells, in their order. In parallel.
+    pub(crate) fn map_stretches<T: Send>(&self, count: usize, of: impl Fn(&[PlacedSpan]) -> T + Sync) -> Vec<T> {
+        let spans: Vec<_> = self.spans().collect();
+        parallel::map(stretches(&spans, self.len().div_ceil(count).max(TABULATED)), |_, spans| of(spans))
+    }
+
     /// A field on these rows with the values of `field` on `from`, and `outside` where `from` has no cell. In parallel.
     pub fn resampled<T: Copy + Send + Sync>(&self, from: &Self, field: &[T], outside: T) -> Vec<T> {
         let mut out = vec![outside; self.len()];
@@ -434,7 +453,6 @@ fn parts<'a, T, const N: usize>(
     fields: [&'a mut [T]; N],
 ) -> Vec<(&'a [PlacedSpan], [&'a mut [T]; N])> {
     let mut rest = fields;
-    let stretches = spans.chunk_by(|a, b| a.1.base as usize / TABULATED == b.1.base as usize / TABULATED);
     let part = |spans: &'a [PlacedSpan]| {
         let len = spans.iter().map(|(_, span)| span.len()).sum();
         let part = rest.each_mut().map(|field| {
@@ -444,19 +462,28 @@ fn parts<'a, T, const N: usize>(
         });
         (spans, part)
     };
-    stretches.map(part).collect()
+    stretches(spans, TABULATED).map(part).collect()
 }
 
-/// Finds cells near each other faster than [`CellRows::find`]: it remembers the last span of each of 16 rows.
+/// Stretches of spans with about `cells` cells each.
+fn stretches(spans: &[PlacedSpan], cells: usize) -> impl Iterator<Item = &[PlacedSpan]> {
+    spans.chunk_by(move |a, b| a.1.base as usize / cells == b.1.base as usize / cells)
+}
+
+/// Finds cells near each other faster than [`CellRows::find`]: it remembers the last span, or gap between spans, of each of 16
+/// rows.
 #[derive(Clone, Debug)]
 pub struct Finder<'a> {
     rows: &'a CellRows,
-    /// For rows with the same y and z modulo 4, the row that was looked at last, and its span.
+    /// For rows with the same y and z modulo 4, the row that was looked at last, and its span or gap.
     last: [Remembered; 16],
 }
 
-/// A row, y and z, and a span of it.
+/// A row, y and z, and a span of it, or a gap.
 type Remembered = std::cell::Cell<([i32; 2], RowSpan)>;
+
+/// Where the values of a gap would be: no field is that long.
+const NOWHERE: u32 = u32::MAX;
 
 impl<'a> Finder<'a> {
     /// Finds cells of these rows.
@@ -468,15 +495,18 @@ impl<'a> Finder<'a> {
     /// Where the value of a cell is; `None` where it is not stored.
     #[inline(always)]
     pub fn find(&self, [x, y, z]: Cell) -> Option<usize> {
-        let (row, span) = self.last[(y & 3 | (z & 3) << 2) as usize].get();
-        if row == [y, z] && span.contains(x) { Some(span.at(x)) } else { self.find_span([x, y, z]) }
+        let (row, mut span) = self.last[(y & 3 | (z & 3) << 2) as usize].get();
+        if row != [y, z] || !span.contains(x) {
+            span = self.look_up([x, y, z]);
+        }
+        (span.base != NOWHERE).then(|| span.at(x))
     }
 
     #[inline(never)]
-    fn find_span(&self, [x, y, z]: Cell) -> Option<usize> {
-        let span = self.rows.span_of([x, y, z])?;
-        self.last[(y & 3 | (z & 3) << 2) as usize].set(([y, z], *span));
-        Some(span.at(x))
+    fn look_up(&self, [x, y, z]: Cell) -> RowSpan {
+        let span = self.rows.span_or_gap([x, y, z]);
+        self.last[(y & 3 | (z & 3) << 2) as usize].set(([y, z], span));
+        span
     }
 }
 

@@ -47,6 +47,23 @@ fn rows_hold_exactly_the_cells_of_the_list() {
     assert_eq!(rows.bounds(), Some(([-9, -9, -9], [10, 7, 5])));
 }
 
+/// Cells of spans, of the gaps between them and beyond, in orders that make a finder forget and remember.
+#[test]
+fn a_finder_finds_what_is_stored_and_nothing_else() {
+    let cells = ragged();
+    let rows = CellRows::from_cells(&cells);
+    let mut asked: Vec<_> = near(&cells, 3).into_iter().chain([[i32::MIN, 0, 0], [i32::MAX, 3, 1]]).collect();
+    for turn in 0..3 {
+        let finder = Finder::new(&rows);
+        for cell in &asked {
+            assert_eq!(finder.find(*cell), rows.find(*cell), "{turn} {cell:?}");
+        }
+        let third = asked.len() / 3;
+        asked.rotate_left(third);
+        asked.sort_by_key(|[x, y, z]| (x % 11, z * turn, *y));
+    }
+}
+
 #[test]
 fn dilated_rows_hold_the_cells_nearby_and_spans_never_touch() {
     let cells = ragged();

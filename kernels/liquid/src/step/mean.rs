@@ -11,9 +11,9 @@
 //! follows its path to second order.
 
 use crate::step::motion::{Gain, Guess, LiquidCells, Motion, largest_of};
-use crate::step::project::{Materials, Projection};
+use crate::step::project::{Materials, PressureEquations, Projection};
 use crate::step::sources::Span;
-use crate::step::substep::{FARTHEST, SLOPING_LAYERS, STEEPEST, layers};
+use crate::step::substep::{FARTHEST, SLOPING_LAYERS, STEEPEST};
 use crate::step::{LiquidReport, LiquidSettings, Splitting, Surface, Surroundings};
 use crate::velocity::{Advection, FaceFields, MacVelocity, Slopes, resampled};
 
@@ -37,6 +37,24 @@ pub(super) struct Start<'a> {
     pub surface: &'a dyn Surface,
     pub around: &'a Surroundings<'a>,
     pub span: Span,
+    /// What is kept of the substep before, where nothing has changed since.
+    pub kept: Option<&'a Kept>,
+}
+
+/// What the end of a substep has in common with the start of the next one, between which nothing moves.
+pub(super) struct Kept {
+    /// The cells of the liquid, beside still solids.
+    cells: LiquidCells,
+    /// The equations of pressure on them, where these are known and depend on nothing else.
+    equations: Option<PressureEquations>,
+}
+
+impl Kept {
+    /// `equations`: those that were solved on these cells.
+    pub(super) fn new(cells: LiquidCells, equations: Option<PressureEquations>) -> Self {
+        let equations = equations.filter(PressureEquations::are_uniform);
+        Self { cells: LiquidCells { solid_velocity: None, ..cells }, equations }
+    }
 }
 
 impl Start<'_> {
@@ -53,13 +71,15 @@ impl Start<'_> {
     /// of the start. `carried`: what is carried in its place, where that is another. `report` counts what it is solved for with.
     pub(super) fn mean_velocity(
         &self,
-        motion: &Motion,
+        motion: &mut Motion,
         carried: Option<&FaceFields<f32>>,
         gained: [f64; 3],
         report: &mut LiquidReport,
     ) -> Option<FaceFields<f32>> {
         let falls = !motion.flying.is_empty() && gained != [0.0; 3];
-        let change = self.change(motion, carried, report);
+        let mut guess = std::mem::take(&mut motion.mean_guess);
+        let change = self.change(motion, carried, &mut guess, report);
+        motion.mean_guess = guess;
         if change.is_none() && !falls {
             return None;
         }
@@ -81,26 +101,42 @@ impl Start<'_> {
         &self,
         motion: &Motion,
         carried: Option<&FaceFields<f32>>,
+        guess: &mut Guess,
         report: &mut LiquidReport,
     ) -> Option<FaceFields<f32>> {
         if !self.may_change(motion, FOLLOWED) {
             return None;
         }
-        let cells = self.cells();
-        let materials = self.materials(motion, &cells);
-        if materials.are_thicker(&cells, THICK) {
+        let made;
+        let (cells, equations) = match self.kept {
+            Some(Kept { cells, equations }) => (cells, equations.as_ref()),
+            None => {
+                made = self.cells();
+                (&made, None)
+            }
+        };
+        let materials = self.materials(motion, cells);
+        if materials.are_thicker(cells, THICK) {
             return None;
         }
-        let mut faces = self.along(motion, carried, &cells);
-        materials.clear_thicker(&cells, THICK, &mut faces);
+        let mut faces = self.along(motion, carried, cells);
+        materials.clear_thicker(cells, THICK, &mut faces);
         let fastest = largest_of(&faces);
         if 0.5 * self.step() * fastest as f32 <= LEAST_BEND {
             return None;
         }
         let settings = LiquidSettings { tolerance: COARSER * self.settings.tolerance, ..self.settings.clone() };
         let coarse = Start { settings: &settings, ..*self };
-        let projection = coarse.projection(&cells, materials, [0.0; 3], fastest);
-        report.count_solves(&projection.by_pressure(fastest, &mut [], &mut faces, &mut Guess::default()));
+        let projection = coarse.projection(cells, materials, [0.0; 3], fastest);
+        let made;
+        let equations = match equations {
+            Some(equations) => equations,
+            None => {
+                made = projection.pressure_equations();
+                &made
+            }
+        };
+        report.count_solves(&projection.by_pressure(equations, fastest, &mut [], &mut faces, guess));
         Some(resampled(motion.rows(), &cells.rows, &faces))
     }
 
@@ -124,7 +160,7 @@ impl Start<'_> {
         let still = faces.each_ref().map(|field| vec![0.0; field.len()]);
         let materials = self.materials(motion, &cells);
         let projection = self.projection(&cells, materials, pulled, motion.largest_speed());
-        let report = projection.apply(&still, &mut [], &mut faces, motion);
+        let (report, _) = projection.apply(&still, &mut [], &mut faces, motion);
         let gained = |axis: usize| faces[axis].iter().zip(&along[axis]).map(|(after, along)| after - along).collect();
         let gained = [gained(0), gained(1), gained(2)];
         motion.gain = Some(Gain { faces: resampled(motion.rows(), &cells.rows, &gained), seconds });
@@ -151,7 +187,8 @@ impl Start<'_> {
         let (settings, step, domain) = (self.settings, self.step(), &self.settings.domain);
         let way = motion.largest_speed() as f32 * step;
         let solid = self.around.solid.map(|solid| solid.at(self.span.times[0]));
-        let rows = motion.rows_past_liquid(domain, layers(0.5 * way));
+        // What is carried comes from these, and from one more between faces.
+        let rows = motion.rows_past_liquid(domain, (0.5 * way).ceil() as i32 + 1);
         let slopes = ([Slopes::nearest(STEEPEST / step)], SLOPING_LAYERS + way.ceil() as u32);
         let own = motion.velocity().faces();
         let half = carried.map(|carried| for_half(own, carried));
@@ -171,7 +208,7 @@ impl Start<'_> {
     }
 
     fn materials(&self, motion: &Motion, cells: &LiquidCells) -> Materials {
-        let Self { settings, surface, around, span } = *self;
+        let Self { settings, surface, around, span, .. } = *self;
         let own = [(around.viscosity)(span.times[0]), settings.density];
         // Taking stock of the points of materials may change them: the substep itself will do so.
         let mut points = motion.materials.clone();

@@ -64,6 +64,7 @@ pub use sources::{AttributeEdit, FlowAccount, LiquidSink, LiquidSource, SourceSh
 pub use substep::{Moving, Owed, Surface, Surroundings};
 
 use self::exchange::Exchange;
+use self::mean::Kept;
 use self::sources::Span;
 use crate::carried::{LiquidMaterial, MaterialPoints, TracerPoints};
 use crate::rows::CellRows;
@@ -349,6 +350,7 @@ impl<S: Surface> Liquid<S> {
         FlowAccount::start_frame(&mut self.motion.sinks, around.sinks.len());
         self.motion.outflow.clear();
         let mut left = seconds;
+        let mut kept = None;
         let beginnings = u32::from(self.rates_change(around, seconds) && !(around.cancelled)());
         if beginnings > 0 {
             left = seconds - BEGINNING * seconds;
@@ -356,7 +358,7 @@ impl<S: Surface> Liquid<S> {
             let span = Span { times: [0.0, seconds - left], next_seconds, ends_frame: false };
             // Unless it was at rest: what moves then does so by what began.
             let is_new = self.motion.is_new && self.motion.largest_speed() > 0.0;
-            report.add(&self.substep(around, span, seconds));
+            report.add(&self.substep(around, span, seconds, &mut kept));
             // What begins at once is no acceleration that goes on.
             (self.motion.gain, self.motion.is_new) = (None, is_new);
         }
@@ -366,7 +368,7 @@ impl<S: Surface> Liquid<S> {
             let after = if count > 1.0 { left - step } else { 0.0 };
             let times = [seconds - left, seconds - after];
             let span = Span { times, next_seconds: step, ends_frame: after == 0.0 };
-            let mut done = self.substep(around, span, seconds);
+            let mut done = self.substep(around, span, seconds, &mut kept);
             done.caps_hit = u32::from(is_capped);
             report.add(&done);
             left = after;
@@ -391,9 +393,15 @@ impl<S: Surface> Liquid<S> {
         Plan { step: left / count, count, is_capped }
     }
 
-    /// A substep of a frame of `seconds`.
-    fn substep(&mut self, around: &Surroundings<'_>, span: Span, seconds: f64) -> LiquidReport {
-        let mut done = substep::substep(&self.settings, &mut self.surface, &mut self.motion, around, span);
+    /// A substep of a frame of `seconds`. `kept`: what the substeps of the frame hand on.
+    fn substep(
+        &mut self,
+        around: &Surroundings<'_>,
+        span: Span,
+        seconds: f64,
+        kept: &mut Option<Kept>,
+    ) -> LiquidReport {
+        let mut done = substep::substep(&self.settings, &mut self.surface, &mut self.motion, around, span, kept);
         done.solid_force = done.solid_force.map(|force| force * (span.times[1] - span.times[0]) / seconds);
         done
     }

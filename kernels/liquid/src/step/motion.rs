@@ -43,6 +43,8 @@ pub struct Motion {
     /// Whether the velocity was set, and there was no substep since.
     pub(super) is_new: bool,
     pub(super) guess: Guess,
+    /// That of the pressure that the mean velocity of a substep is solved for with.
+    pub(super) mean_guess: Guess,
     pub(super) liquid_cells: usize,
     /// What each source has given, and what it owes.
     pub(super) sources: Vec<FlowAccount>,

@@ -112,29 +112,49 @@ impl Materials {
     }
 }
 
+/// The equations of a pressure that acts alone.
+pub(super) struct PressureEquations {
+    solver: PressureSolver,
+    /// The density at each low face, where it is not the same everywhere.
+    density: Option<FaceFields<f32>>,
+}
+
+impl PressureEquations {
+    /// Whether the liquid has the same density everywhere: they then depend on its cells alone.
+    pub(super) fn are_uniform(&self) -> bool {
+        self.density.is_none()
+    }
+}
+
 impl Projection<'_> {
-    /// Lets pressure act on a velocity, and viscosity where it counts. `before`: the velocity without gravity.
+    /// Lets pressure act on a velocity, and viscosity where it counts. `before`: the velocity without gravity. Returns the
+    /// equations of pressure, too, where these are solved alone.
     pub(super) fn apply(
         &self,
         before: &FaceFields<f32>,
         pours: &mut [Pour],
         faces: &mut FaceFields<f32>,
         motion: &mut Motion,
-    ) -> LiquidReport {
+    ) -> (LiquidReport, Option<PressureEquations>) {
         let solve = self.settings.coupling.solve(self.materials.largest(self.cells));
-        let mut report = match solve {
-            ViscousSolve::Coupled => {
+        let equations = (solve != ViscousSolve::Coupled).then(|| self.pressure_equations());
+        let mut report = match &equations {
+            None => {
                 let likely = motion.with_last_gain(self.cells, before, self.seconds);
                 self.by_pressure_and_viscosity(&likely, pours, faces, &mut motion.guess)
             }
-            ViscousSolve::Decoupled => self.by_pressure_then_viscosity(pours, faces, &mut motion.guess),
-            ViscousSolve::LeftOut => self.by_pressure(self.speed.max(self.pull()), pours, faces, &mut motion.guess),
+            Some(equations) if solve == ViscousSolve::Decoupled => {
+                self.by_pressure_then_viscosity(equations, pours, faces, &mut motion.guess)
+            }
+            Some(equations) => {
+                self.by_pressure(equations, self.speed.max(self.pull()), pours, faces, &mut motion.guess)
+            }
         };
         pours.iter().for_each(|pour| pour.enter(motion, self.seconds));
         let density = self.materials.of_cells.as_ref().map(|[_, density]| &density[..]);
         let rested = self.force(rested(self.cut, self.gravity, density));
         report.solid_force.iter_mut().zip(rested).for_each(|(force, rested)| *force += rested);
-        LiquidReport { viscous_substeps: u32::from(solve != ViscousSolve::LeftOut), ..report }
+        (LiquidReport { viscous_substeps: u32::from(solve != ViscousSolve::LeftOut), ..report }, equations)
     }
 
     /// The largest component of what gravity adds, m/s.
@@ -142,28 +162,34 @@ impl Projection<'_> {
         self.gravity.iter().fold(0.0, |most, g| most.max(g.abs()))
     }
 
-    /// Drives the divergence out of a velocity. `scale`: the speed that errors are measured against, m/s.
-    pub(super) fn by_pressure(
-        &self,
-        scale: f64,
-        pours: &mut [Pour],
-        faces: &mut FaceFields<f32>,
-        guess: &mut Guess,
-    ) -> LiquidReport {
+    /// Sets the equations of pressure up.
+    pub(super) fn pressure_equations(&self) -> PressureEquations {
         let cells = self.cells;
         let density = self.materials.of_faces(cells);
         let lighter = density.as_ref().map(|density| divided(&cells.open, density));
         let [x, y, z] = lighter.as_ref().unwrap_or(&cells.open);
         let periods = self.settings.domain.periods();
         let grid = PressureGrid { rows: &cells.rows, level_set: &cells.level_set, weights: [x, y, z], periods };
-        let solver = PressureSolver::new(&grid);
-        let mut inflow = inflow(&solver, cells, faces);
-        let poured = pour(pours, &solver, self.settings.cell, &mut inflow);
+        PressureEquations { solver: PressureSolver::new(&grid), density }
+    }
+
+    /// Drives the divergence out of a velocity. `scale`: the speed that errors are measured against, m/s.
+    pub(super) fn by_pressure(
+        &self,
+        PressureEquations { solver, density }: &PressureEquations,
+        scale: f64,
+        pours: &mut [Pour],
+        faces: &mut FaceFields<f32>,
+        guess: &mut Guess,
+    ) -> LiquidReport {
+        let cells = self.cells;
+        let mut inflow = inflow(solver, cells, faces);
+        let poured = pour(pours, solver, self.settings.cell, &mut inflow);
         let mut q = solver.rows().resampled(&guess.rows, &guess.q, 0.0);
         let stop = Stop { flow: self.flow_tolerance(scale), iterations: self.settings.max_iterations };
         let solved = solver.solve(&mut inflow, &mut q, stop);
-        subtract_gradient(&solver, cells, density.as_ref(), &q, faces);
-        let force = self.force(pressed(self.cut, &solver, &q));
+        subtract_gradient(solver, cells, density.as_ref(), &q, faces);
+        let force = self.force(pressed(self.cut, solver, &q));
         *guess = Guess { rows: solver.rows().clone(), q };
         let is_done = solved.flow <= stop.flow;
         LiquidReport {

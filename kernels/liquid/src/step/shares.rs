@@ -9,7 +9,7 @@ use crate::step::domain::Domain;
 use crate::velocity::{Site, trilinear};
 
 /// |φ| of a cell, in cells, from which on it is all liquid or all air.
-const WHOLE: f32 = 1.0;
+pub(super) const WHOLE: f32 = 1.0;
 
 /// How far from the middle of a surface cell, in surface cells along each axis, the 2³ places are where it is looked at.
 const ASIDE: f32 = 0.25;

@@ -7,7 +7,7 @@ use crate::step::exchange::Imposed;
 use crate::step::force::pressed;
 use crate::step::motion::Guess;
 use crate::step::pour::{Pour, pour};
-use crate::step::project::{Projection, covered, net};
+use crate::step::project::{PressureEquations, Projection, covered, net};
 use crate::velocity::FaceFields;
 use crate::viscosity::{StokesGrid, StokesSolver, StokesStop, ViscousStop};
 
@@ -97,17 +97,18 @@ impl Projection<'_> {
     /// Drives the divergence out of a velocity, lets viscosity act, and drives out what divergence that made.
     pub(super) fn by_pressure_then_viscosity(
         &self,
+        equations: &PressureEquations,
         pours: &mut [Pour],
         faces: &mut FaceFields<f32>,
         guess: &mut Guess,
     ) -> LiquidReport {
         let scale = self.creep();
         let images = &self.cells.images;
-        let first = self.by_pressure(scale, &mut pours.to_vec(), faces, guess);
+        let first = self.by_pressure(equations, scale, &mut pours.to_vec(), faces, guess);
         images.fill_each(faces);
         let viscous = self.by_viscosity(scale, faces);
         images.fill_each(faces);
-        let second = self.by_pressure(scale, pours, faces, &mut Guess::default());
+        let second = self.by_pressure(equations, scale, pours, faces, &mut Guess::default());
         let forces = [first.solid_force, viscous.solid_force, second.solid_force];
         LiquidReport {
             pressure_iterations: first.pressure_iterations + second.pressure_iterations,

@@ -9,7 +9,7 @@ use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
 use crate::step::flight::flying;
 use crate::step::force::cut_cells;
-use crate::step::mean::Start;
+use crate::step::mean::{Kept, Start};
 use crate::step::motion::{Gain, LiquidCells, Motion, largest_of};
 use crate::step::outflow::outflow;
 use crate::step::passed::passed_over;
@@ -164,13 +164,15 @@ pub(super) fn most_layers() -> i32 {
     layers(FARTHEST)
 }
 
-/// Moves on by a substep. Gravity and viscosity are read in the middle.
+/// Moves on by a substep. Gravity and viscosity are read in the middle. `kept`: what is kept of the last substep, unless something
+/// has changed since; what is kept of this one takes its place.
 pub(super) fn substep(
     settings: &LiquidSettings,
     surface: &mut dyn Surface,
     motion: &mut Motion,
     around: &Surroundings<'_>,
     span: Span,
+    kept: &mut Option<Kept>,
 ) -> LiquidReport {
     let times = span.times;
     let (seconds, middle) = (times[1] - times[0], 0.5 * (times[0] + times[1]));
@@ -178,12 +180,13 @@ pub(super) fn substep(
     let [on_way, solid] = [middle, times[1]].map(|time| around.solid.map(|solid| solid.at(time)));
     let step = (seconds / settings.cell) as f32;
     let gravity = (around.gravity)(middle).map(|g| g * seconds);
-    let start = Start { settings, surface, around, span };
+    let start = Start { settings, surface, around, span, kept: kept.as_ref() };
     let mut before_end = start.begin(motion);
     let periods = settings.domain.periods();
     let turned = |gain| turned::carried(motion, gain, periods, seconds, [step, STEEPEST / step]);
     let carried = motion.gain.as_ref().map(turned);
     let mean = start.mean_velocity(motion, carried.as_ref(), gravity, &mut before_end);
+    *kept = None;
     let Continued { velocity, carried, way, reach } =
         continued(&settings.domain, motion, (mean.as_ref(), carried), on_way, step);
     let flow = Moving { velocity: &velocity, step, periods, solid: on_way };
@@ -191,7 +194,7 @@ pub(super) fn substep(
     let left_domain = outflow.iter().map(|outflow| outflow.volume).sum();
     motion.outflow.extend(outflow);
     motion.carry(&flow, surface.view(), settings);
-    let held = remainder::Held::of(velocity.rows(), surface, &settings.domain);
+    let held = remainder::Held::of(velocity.rows(), surface, &settings.domain, reach);
     if let Some(swelling) = Swelling::of(&flow, &surface.view(), &settings.domain) {
         surface.swell(&swelling);
     }
@@ -237,7 +240,7 @@ pub(super) fn substep(
         // Of liquid at rest without weight only solids say how fast it will be.
         projection.speed = cells.largest_solid_speed();
     }
-    let mut report = projection.apply(&before, &mut exchanged.pours, &mut faces, motion);
+    let (mut report, equations) = projection.apply(&before, &mut exchanged.pours, &mut faces, motion);
     cells.images.fill_each(&mut faces);
     report.substeps = 1;
     report.cfl_reached = f64::from(way);
@@ -253,8 +256,10 @@ pub(super) fn substep(
     });
     motion.liquid_cells = cells.liquid.len();
     motion.flying = flying(&cells, &settings.domain);
-    motion.known = cells.known;
-    motion.velocity = MacVelocity::new(cells.rows, faces);
+    motion.known = cells.known.clone();
+    motion.velocity = MacVelocity::new(cells.rows.clone(), faces);
+    // Faces with an imposed velocity count as closed in the cells.
+    *kept = imposed.is_empty().then(|| Kept::new(cells, equations));
     report
 }
 

@@ -46,6 +46,33 @@ fn a_liquid_taken_apart_and_resumed_goes_on_with_the_same_bits() {
     assert!(bits(&whole) == bits(&resumed) && whole.motion() == resumed.motion());
 }
 
+/// What a substep keeps for the next one within a frame is what that would have made, beside a solid that moves, too.
+#[test]
+fn a_frame_of_several_substeps_has_the_bits_of_several_frames() {
+    let domain = Domain::closed([0; 3], [24, 16, 12]);
+    let run = |frames: &[f64]| {
+        let surface = PlainLevelSet::new(domain, block([3.0, -9.0, -9.0], [11.0, 9.0, 30.0]));
+        let mut liquid = Liquid::new(LiquidSettings::new(domain, 1.0 / 24.0), surface);
+        // 1.4 cells in a 32nd of a second.
+        liquid.set_velocity(|_| [1.4 * 32.0 / 24.0, 0.0, 0.0], &WEIGHTLESS);
+        let (mut start, mut substeps) = (0.0, 0);
+        for seconds in frames {
+            let ball = |time: f64, p: Vec3| {
+                let x = 14.0 - 8.0 * (start + time) as f32;
+                length([p[0] - x, p[1] - 1.0, p[2] - 6.0]) - 3.2
+            };
+            let velocity = |_: f64, _: Vec3| [-8.0 / 24.0, 0.0, 0.0];
+            let solid = Solid { distance: &ball, velocity: &velocity, speed: 8.0 / 24.0 };
+            substeps += liquid.step_frame(&Surroundings { solid: Some(solid), ..WEIGHTLESS }, *seconds).substeps;
+            start += seconds;
+        }
+        (substeps, bits(&liquid))
+    };
+    let (whole, halves) = (run(&[1.0 / 16.0]), run(&[1.0 / 32.0; 2]));
+    assert!(whole.0 > 1 && whole.0 == halves.0, "{} {}", whole.0, halves.0);
+    assert!(whole.1 == halves.1);
+}
+
 #[test]
 fn memory_follows_the_liquid() {
     let domain = Domain::closed([0; 3], [64; 3]);
