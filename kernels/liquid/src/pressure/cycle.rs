@@ -97,10 +97,10 @@ impl Multigrid {
 }
 
 /// What the weights of interpolation are multiplied by in each fine cell; 0 where it is not liquid. Solid cells are left
-/// out, so that walls do not pull the pressure down; air counts, with pressure 0. That is at the surface, which may be far
-/// nearer than the centre of the next cell: what is interpolated falls by as much as the pressure does whose neighbours stay
-/// as they are. A correction that did not would be too large by 1/θ there, θ the distance of the surface, and cost twice the
-/// iterations in a splash.
+/// out, so that walls do not pull the pressure down; air counts, with pressure 0 at the centres of its cells. The surface may
+/// be much nearer, at θ cells: a cell whose neighbours keep their pressure then has less of it, by the share of the surface in
+/// the diagonal, and so has what is interpolated there. Without that a correction is too large by 1/θ next to the surface, and
+/// a splash takes twice the iterations.
 fn scales(fine: &Level, coarse: &Level) -> Vec<f32> {
     let interpolated = |kind: CellKind| {
         let is_kind: Vec<f32> = coarse.kinds.iter().map(|other| f32::from(*other == kind)).collect();

@@ -169,15 +169,15 @@ impl PressureSolver {
     /// Improves a first guess, not 0, that solves the equations but for `residual`. Returns the largest entry of what that is then.
     fn improve_guess(&self, q: &mut [f64], residual: &mut [f64], product: &mut [f64]) -> f64 {
         let finest = self.multigrid.finest();
-        // Where the surface has come near the centre of a cell, what was the pressure there would drive a hundred times the
-        // flow: such cells take the pressure that their neighbours leave them.
+        // Where the surface has come near the centre of a cell, the old pressure there would drive a hundred times the flow:
+        // cells beside air take the pressure that their neighbours leave them.
         let mut change: Vec<f64> = (finest.surface.iter().zip(&finest.inverse_diagonal).zip(&*residual))
             .map(|((surface, inverse), residual)| if *surface > 0.0 { f64::from(*inverse) * residual } else { 0.0 })
             .collect();
         finest.apply(&mut change, product);
         add_scaled(q, 1.0, &change);
         add_scaled(residual, -1.0, product);
-        // Then as much of all of it as is best, which may be little.
+        // The multiple of the guess with the least error, which may be a small one.
         finest.apply(q, product);
         let curvature = dot(q, product);
         if curvature > 0.0 {
