@@ -166,12 +166,13 @@ impl<'a> Study<'a> {
         Ok(())
     }
 
-    /// Cooks a run that has no more than `round` cooks once more, unless that takes long and was not asked for.
+    /// Cooks a run that has no more than `round` cooks once more, unless that takes long and is more than was asked for.
     fn again(&mut self, place: usize, round: u32) -> Result<(), Stop> {
         let frames = self.subject.request.frames.len() as f64;
         let run = &mut self.stored.runs[place];
         let Some(cost) = run.cost() else { return Ok(()) };
-        let is_long = self.repeats.is_none() && cost.ms * frames * f64::from(cost.repeats) > LONG;
+        let is_asked = self.repeats.is_some_and(|asked| round < asked);
+        let is_long = !is_asked && cost.ms * frames * f64::from(cost.repeats) > LONG;
         if cost.repeats <= round && !is_long {
             self.subject.repeat(&self.knobs, run)?;
             self.store.save(&self.stored, false)?;
@@ -196,7 +197,8 @@ impl<'a> Study<'a> {
             reversed[place] = match direction::is_reversed(&fine, &coarse) {
                 Some(is_reversed) => is_reversed,
                 None => {
-                    for round in 1..self.repeats.unwrap_or(REPEATS) {
+                    // One time alone may be twice what the next is, whatever was asked for.
+                    for round in 1..self.repeats.unwrap_or(REPEATS).max(REPEATS) {
                         for setting in [&first, &best] {
                             if let Some(run) = self.stored.runs.iter().position(|run| run.setting == *setting) {
                                 self.again(run, round)?;
