@@ -7,7 +7,7 @@ use liquid::carried::{LiquidMaterial, MaterialPoints};
 use liquid::level_set::{BAND, PhiView};
 use liquid::marked::MarkedSurface;
 use liquid::step::{
-    Liquid, LiquidReport, LiquidSettings, LiquidSink, LiquidSource, Motion, Solid, Surface, Surroundings,
+    Liquid, LiquidReport, LiquidSettings, LiquidSink, LiquidSource, Motion, Owed, Solid, Surface, Surroundings,
 };
 use liquid::velocity::Sampler;
 use liquid::volumes::{LostPiece, VolumeReport, VolumeTargets, cap};
@@ -64,6 +64,8 @@ pub(super) struct Run {
     /// The liquids at the start; those of sources are numbered on from there.
     start_phases: u32,
     pub(super) spray: Vec<SprayDrop>,
+    /// What the surface has to gain in the next step, for drops that it lost in this one.
+    owed: Vec<Owed>,
     /// The id of the next drop; they count down from −1.
     next_drop: i32,
     /// The attributes that came with liquid, sources and tracers.
@@ -145,6 +147,7 @@ impl Chain for Run {
             targets,
             start_phases,
             spray: Vec::new(),
+            owed: Vec::new(),
             next_drop: -1,
             columns,
             tracer_ids: tracer_ids(&tracers),
@@ -281,7 +284,8 @@ impl Run {
         });
         let landed = rejoining(&mut self.spray, liquid.surface(), lattice.cell);
         let in_cells = |volume: f64| (volume / (lattice.cell * lattice.cell * lattice.cell)) as f32;
-        let owed: Vec<_> = landed.iter().map(|drop| (drop.place, in_cells(drop.volume))).collect();
+        let mut owed = std::mem::take(&mut self.owed);
+        owed.extend(landed.iter().map(|drop| (drop.place, in_cells(drop.volume))));
         liquid.give(&owed);
         (self.surface, self.motion) = liquid.into_parts();
         for drop in landed {
@@ -320,7 +324,12 @@ impl Run {
         self.metrics.set(MADE_GOOD, percent(corrected.corrected, corrected.target));
         self.metrics.set(MADE_GOOD_NOW, percent(corrected.corrected_now, corrected.target));
         self.spray(&corrected.lost, air);
+        self.owed.extend(&corrected.owed);
         let now = self.gather(settings, air).unwrap_or(corrected);
+        if report.caps_hit > 0 {
+            // In substeps too long to follow the liquid, no region knew what it had lost.
+            self.owed.clear();
+        }
         let waiting = self.targets.take_waiting();
         self.spray(&waiting, air);
         self.metrics.set(VOLUME_DRIFT_RAW, now.raw_drift);
@@ -362,6 +371,7 @@ impl Run {
         let at_end = |point: [f32; 3]| air.colliders.distance(1.0, point);
         let now = self.targets.measure(&mut self.surface, air.colliders.solid(&at_end), phases.as_ref());
         self.spray(&now.lost, air);
+        self.owed.extend(&now.owed);
         Some(now)
     }
 

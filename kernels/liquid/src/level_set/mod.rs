@@ -251,10 +251,17 @@ impl LevelSet {
         }
     }
 
-    /// Makes cells air. Follow with [`Self::fill`].
+    /// Makes cells air, and φ around them a distance again; farther away it stays as it is.
     pub(crate) fn take_out(&mut self, cells: &CellRows) {
+        let mut kept = self.phi.clone();
         let phi = &mut self.phi;
         self.stencil.rows().for_each_shared(cells, |from, _, len| phi[from..from + len].fill(BAND));
+        self.fill();
+        self.stencil.rows().for_each_shared(&cells.dilated(BAND as i32), |from, _, len| {
+            kept[from..from + len].copy_from_slice(&self.phi[from..from + len]);
+        });
+        self.phi = kept;
+        self.copy_to_walls();
     }
 
     /// Makes the surface go on into a solid that it wets, to a depth of [`CONTACT`] cells, beyond which there is no liquid.

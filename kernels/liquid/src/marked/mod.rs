@@ -15,7 +15,7 @@ use crate::extract::{Placement, QuadMesh, extract_with};
 use crate::level_set::{BAND, Distance, Flow, Held, LevelSet, PhiChange, PhiView, Sides};
 use crate::markers::{FARTHEST, Marker, Markers};
 use crate::rows::{Cell, CellRows, Periods};
-use crate::step::{Domain, Moving, Surface, Swelling};
+use crate::step::{Domain, Moving, Owed, Shares, Surface, Swelling, Wall};
 
 /// Images beyond a periodic side, besides those that move in, so that φ in the band is that of a surface without an end.
 const IMAGES: i32 = 8;
@@ -152,13 +152,28 @@ impl MarkedSurface {
         self.restrict();
     }
 
-    /// Takes out surface cells, whole pieces of the liquid, and their markers.
-    pub(crate) fn take_out(&mut self, cells: &CellRows, is_taken: impl Fn(u32) -> bool) {
-        self.set.take_out(cells);
+    /// Takes out surface cells, whole pieces of the liquid, and their markers. Returns what the solver's cells no longer hold.
+    pub(crate) fn take_out(&mut self, cells: &CellRows, is_taken: impl Fn(u32) -> bool) -> Vec<Owed> {
+        let domain = self.domain();
+        let around = coarsened(&cells.dilated(BAND as i32 + 1), self.resolution);
+        let around = domain.periods().gathered(around).clipped(domain.low, domain.high);
+        let before = self.shares(&around);
         let pieces = self.markers.pieces().to_vec();
         self.markers.retain(|n| !is_taken(pieces[n]));
-        self.among_images(0.0, |_, set| set.fill());
+        let cells = self.periods.with_images(cells.clone(), IMAGES);
+        self.among_images(0.0, |_, set| set.take_out(&cells));
         self.restrict();
+        let taken = before.iter().zip(self.shares(&around)).map(|(before, now)| before - now);
+        let of_cells = around.iter().zip(taken).filter(|(_, taken)| *taken != 0.0);
+        of_cells.map(|(cell, taken)| (cell.map(|x| x as f32 + 0.5), taken)).collect()
+    }
+
+    /// How much of each of some solver cells is liquid.
+    pub(crate) fn shares(&self, cells: &CellRows) -> Vec<f32> {
+        let domain = self.domain();
+        let shares = Shares::of(self, &domain);
+        let [shares] = cells.tabulate_with(|| shares.reader(), |share, cell, _| share(cell, [0.0]).0);
+        shares
     }
 
     /// Calls `f` with the surface and its images, `reach` cells and those that its distances need beyond the sides, and
@@ -192,7 +207,14 @@ impl MarkedSurface {
         self.periods
     }
 
-    /// The domain in solver cells.
+    /// The domain, in which walls are either periodic or closed.
+    fn domain(&self) -> Domain {
+        let (low, high) = self.solver_domain();
+        let wall = |period: i32| if period > 0 { Wall::Periodic } else { Wall::Closed };
+        Domain { low, high, walls: self.periods.0.map(|period| [wall(period); 2]) }
+    }
+
+    /// The domain's corners, in solver cells.
     fn solver_domain(&self) -> (Cell, Cell) {
         let (low, high) = self.set.domain();
         (low.map(|x| x / self.resolution), high.map(|x| x / self.resolution))

@@ -60,6 +60,8 @@ pub use continuity::Swelling;
 pub use domain::{Domain, Solid, Wall};
 pub use motion::Motion;
 pub use outflow::Outflow;
+pub(crate) use remainder::SIZE as REGION;
+pub(crate) use shares::Shares;
 pub use sources::{AttributeEdit, FlowAccount, LiquidSink, LiquidSource, SourceShape};
 pub use substep::{Moving, Owed, Surface, Surroundings};
 

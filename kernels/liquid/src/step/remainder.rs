@@ -14,7 +14,7 @@ use crate::velocity::Site;
 
 /// The side of a region, in cells. It is less along a periodic axis, of which regions make up the whole. Of small regions, the error of where
 /// liquid was disturbs a ball that spins.
-const SIZE: i32 = 24;
+pub(crate) const SIZE: i32 = 24;
 
 /// A way outward, in cells, by which what a cell gains by one is measured.
 const WAY: f32 = 0.1;
@@ -31,6 +31,9 @@ const LITTLE_SURFACE: f64 = 32.0;
 
 /// The area, ÷ cell², of surface that anything can be given to.
 const LEAST_SURFACE: f64 = 1.0;
+
+/// How far, in cells, a surface swells in a region at least for a second look at what it lacks.
+const WORTH_A_LOOK: f64 = 0.03;
 
 /// Stretches of cells that are summed each by itself, so that threads may share the work.
 const STRETCHES: usize = 64;
@@ -101,51 +104,81 @@ impl Others<'_> {
     }
 }
 
-/// How far a surface swells after it has moved by a flow that moves nothing farther than `reach` cells: in each region of the liquid, by
-/// what is missing there of what cells `held` before. Liquid belongs to the regions around where it was. Regions in which `others` are
-/// near liquid lose and gain nothing.
-pub(super) fn remainder<'a>(
-    flow: &Moving<'_>,
-    surface: &dyn Surface,
+/// What a surface has not kept, moved by a flow that moves nothing farther than `reach` cells: in each region of the liquid, what is
+/// missing there of what cells `held` before. Liquid belongs to the regions around where it was. Regions in which `others` are near
+/// liquid lose and gain nothing.
+pub(super) struct Remainder<'a> {
+    flow: &'a Moving<'a>,
     held: &'a Held,
-    others: &Others<'_>,
+    others: &'a Others<'a>,
     reach: f32,
-) -> Option<Swelling<'a>> {
-    let (rows, domain) = (&held.rows, others.domain);
-    let shares = Shares::of(surface, domain);
-    let regions = Regions::of(rows, domain);
-    let parts = rows.map_stretches(STRETCHES, |spans| {
-        let (mut share, mut way) = (shares.reader(), flow.reader());
-        let [mut near, mut near_before, mut near_now] = [(); 3].map(|()| regions.reader());
-        let mut lack = Lack::none(&regions);
-        for (cell, n) in spans.iter().flat_map(cells_of) {
-            let ([now, more, less], middle) = share(cell, [0.0, WAY, -WAY]);
-            let before = f64::from(held.volume[n]);
-            if f64::from(more).max(before) == 0.0 {
-                continue;
-            }
-            let (gain, is_apart) = ((more - less) / (2.0 * WAY), others.are_near(cell, reach + BESIDE));
-            if gain != 0.0 || is_apart {
-                for (at, weight) in near(Site::Centre.of(cell)) {
-                    lack.area[at] += weight * f64::from(gain);
-                    lack.is_apart[at] |= is_apart;
+    regions: Regions,
+    lack: Lack,
+    /// What cells held when they were last counted; empty before.
+    counted: Vec<f32>,
+    /// How far the surface last swelled in any region, in cells.
+    farthest: f64,
+}
+
+impl<'a> Remainder<'a> {
+    pub(super) fn of(flow: &'a Moving<'a>, held: &'a Held, others: &'a Others<'a>, reach: f32) -> Self {
+        let regions = Regions::of(&held.rows, others.domain);
+        let lack = Lack::none(&regions);
+        Self { flow, held, others, reach, regions, lack, counted: Vec::new(), farthest: f64::INFINITY }
+    }
+
+    /// How far the surface swells for what is missing; `None` where nothing is, or what is missing since it last swelled is not worth
+    /// a look: what thin sheets gain is not in proportion to how far they swell, but little where that is little.
+    pub(super) fn swelling(&mut self, surface: &dyn Surface) -> Option<Swelling<'a>> {
+        if self.farthest < WORTH_A_LOOK {
+            return None;
+        }
+        self.count(surface);
+        let ways = self.lack.ways(&self.regions);
+        self.farthest = ways.iter().fold(0.0, |farthest, way| way.abs().max(farthest));
+        swelling(&ways, &self.regions, &self.held.rows, surface, self.others.domain)
+    }
+
+    /// Takes what cells hold now from what is missing, in place of what they held when they were last counted.
+    fn count(&mut self, surface: &dyn Surface) {
+        let Self { flow, held, others, reach, regions, .. } = &*self;
+        let (shares, is_first) = (Shares::of(surface, others.domain), self.counted.is_empty());
+        let parts = held.rows.map_stretches(STRETCHES, |spans| {
+            let (mut share, mut way) = (shares.reader(), flow.reader());
+            let [mut near, mut near_before, mut near_now] = [(); 3].map(|()| regions.reader());
+            let (mut lack, mut counted) = (Lack::none(regions), Vec::new());
+            for (cell, n) in spans.iter().flat_map(cells_of) {
+                let ([now, more, less], middle) = share(cell, [0.0, WAY, -WAY]);
+                counted.push(now);
+                let (before, last) = if is_first { (held.volume[n], 0.0) } else { (0.0, self.counted[n]) };
+                let (gain, came) = ((more - less) / (2.0 * WAY), now - last);
+                let is_new = came != 0.0 || is_first && more.max(before) > 0.0;
+                let is_apart = is_new && others.are_near(cell, reach + BESIDE);
+                if gain != 0.0 || is_apart {
+                    for (at, weight) in near(Site::Centre.of(cell)) {
+                        lack.area[at] += weight * f64::from(gain);
+                        lack.is_apart[at] |= is_apart;
+                    }
+                }
+                if before > 0.0 {
+                    let of_regions = near_before(held.middle(n)).into_iter();
+                    of_regions.for_each(|(at, weight)| lack.volume[at] += weight * f64::from(before));
+                }
+                if came != 0.0 {
+                    let halfway = sub(middle, scale(way(middle), 0.5));
+                    let of_regions = near_now(sub(middle, way(halfway))).into_iter();
+                    of_regions.for_each(|(at, weight)| lack.volume[at] -= weight * f64::from(came));
                 }
             }
-            if before > 0.0 {
-                near_before(held.middle(n)).into_iter().for_each(|(at, weight)| lack.volume[at] += weight * before);
-            }
-            if now > 0.0 {
-                let halfway = sub(middle, scale(way(middle), 0.5));
-                near_now(sub(middle, way(halfway)))
-                    .into_iter()
-                    .for_each(|(at, weight)| lack.volume[at] -= weight * f64::from(now));
-            }
+            (lack, counted)
+        });
+        self.lack.area.fill(0.0);
+        self.counted.clear();
+        for (lack, counted) in parts {
+            self.lack.add(&lack);
+            self.counted.extend(counted);
         }
-        lack
-    });
-    let mut lack = Lack::none(&regions);
-    parts.iter().for_each(|part| lack.add(part));
-    lack.swelling(&regions, rows, surface, domain)
+    }
 }
 
 /// The cells of a span, and where the value of each is in a field.
@@ -160,7 +193,7 @@ pub(super) fn given<'a>(
     domain: &Domain,
     owed: &[Owed],
 ) -> Option<Swelling<'a>> {
-    if owed.is_empty() {
+    if owed.is_empty() || rows.is_empty() {
         return None;
     }
     let shares = Shares::of(surface, domain);
@@ -179,7 +212,7 @@ pub(super) fn given<'a>(
     for (place, volume) in owed {
         near(*place).into_iter().for_each(|(at, weight)| lack.volume[at] += weight * f64::from(*volume));
     }
-    lack.swelling(&regions, rows, surface, domain)
+    swelling(&lack.ways(&regions), &regions, rows, surface, domain)
 }
 
 /// Regions of the domain, each with a weight that falls linearly from its middle to those of the regions beside.
@@ -288,32 +321,31 @@ impl Lack {
         counted().for_each(|(at, _)| ways[at] = (ways[at] + everywhere).clamp(-MOST, MOST));
         ways
     }
+}
 
-    /// How far the surface swells; `None` where nothing is missing.
-    fn swelling<'a>(
-        &self,
-        regions: &Regions,
-        rows: &'a CellRows,
-        surface: &dyn Surface,
-        domain: &Domain,
-    ) -> Option<Swelling<'a>> {
-        let ways = self.ways(regions);
-        if ways.iter().all(|way| *way == 0.0) {
-            return None;
-        }
-        let view = surface.view();
-        let [by] = rows.tabulate_with(
-            || (Finder::new(view.rows), regions.reader()),
-            |(phis, near), cell, _| {
-                let phi = phis.find(inner(domain, cell)).map_or(view.outside, |at| view.phi[at]);
-                if phi.abs() > NEAR {
-                    return [0.0];
-                }
-                [near(Site::Centre.of(cell)).into_iter().fold(0.0, |sum, (at, weight)| sum + weight * ways[at]) as f32]
-            },
-        );
-        Some(Swelling::new(rows, by, domain))
+/// How far a surface swells if it does by `ways`, in cells, in the middle of each region; `None` where that is nothing.
+fn swelling<'a>(
+    ways: &[f64],
+    regions: &Regions,
+    rows: &'a CellRows,
+    surface: &dyn Surface,
+    domain: &Domain,
+) -> Option<Swelling<'a>> {
+    if ways.iter().all(|way| *way == 0.0) {
+        return None;
     }
+    let view = surface.view();
+    let [by] = rows.tabulate_with(
+        || (Finder::new(view.rows), regions.reader()),
+        |(phis, near), cell, _| {
+            let phi = phis.find(inner(domain, cell)).map_or(view.outside, |at| view.phi[at]);
+            if phi.abs() > NEAR {
+                return [0.0];
+            }
+            [near(Site::Centre.of(cell)).into_iter().fold(0.0, |sum, (at, weight)| sum + weight * ways[at]) as f32]
+        },
+    );
+    Some(Swelling::new(rows, by, domain))
 }
 
 #[cfg(test)]
@@ -349,8 +381,11 @@ mod tests {
         let velocity = MacVelocity::new(rows, [vec![1.5; len], vec![0.0; len], vec![0.0; len]]);
         let flow = Moving { velocity: &velocity, step: 1.0, periods: DOMAIN.periods(), solid: None };
         let small = volume(&after);
-        if let Some(swelling) = remainder(&flow, &after.clone(), &held, others, 1.5) {
-            after.swell(&swelling);
+        let mut remainder = Remainder::of(&flow, &held, others, 1.5);
+        for _ in 0..2 {
+            if let Some(swelling) = remainder.swelling(&after) {
+                after.swell(&swelling);
+            }
         }
         (volume(&after) - small) / (volume(&before) - small)
     }

@@ -25,7 +25,7 @@ pub(super) fn inner(domain: &Domain, cell: Cell) -> Cell {
 }
 
 /// How much of cells is liquid.
-pub(super) struct Shares<'a> {
+pub(crate) struct Shares<'a> {
     domain: &'a Domain,
     /// φ of the surface.
     view: PhiView<'a>,
@@ -35,14 +35,14 @@ pub(super) struct Shares<'a> {
 }
 
 impl<'a> Shares<'a> {
-    pub(super) fn of(surface: &'a dyn Surface, domain: &'a Domain) -> Self {
+    pub(crate) fn of(surface: &'a dyn Surface, domain: &'a Domain) -> Self {
         let (finest, fine) = surface.finest_view();
         Self { domain, view: surface.view(), finest, fine }
     }
 
     /// The shares of a cell that are liquid if the surface moves outward by so many cells, and the middle of the first of them, in
     /// cells: by φ in the middle of 2³ parts of each surface cell. Fast where successive cells are near each other.
-    pub(super) fn reader<const N: usize>(&self) -> impl FnMut(Cell, [f32; N]) -> ([f32; N], Vec3) {
+    pub(crate) fn reader<const N: usize>(&self) -> impl FnMut(Cell, [f32; N]) -> ([f32; N], Vec3) {
         let (coarse, around) = (Finder::new(self.view.rows), self.around());
         let mut near = Vec::new();
         let (fine, size) = (self.fine as usize, self.fine as usize + 2);

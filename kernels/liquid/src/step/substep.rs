@@ -14,7 +14,7 @@ use crate::step::motion::{Gain, LiquidCells, Motion, largest_of};
 use crate::step::outflow::outflow;
 use crate::step::passed::passed_over;
 use crate::step::project::{Materials, Projection};
-use crate::step::remainder::{self, Others};
+use crate::step::remainder::{self, Others, Remainder};
 use crate::step::sources::{LiquidSink, LiquidSource, SourceShape, Span};
 use crate::step::turned;
 use crate::step::{LiquidReport, LiquidSettings, Splitting};
@@ -153,6 +153,9 @@ pub(super) const SLOPING_LAYERS: u32 = 2;
 /// anywhere.
 pub(super) const FARTHEST: f32 = 64.0;
 
+/// Times in a substep, at most, that a surface gets back what it did not keep.
+const LOOKS: u32 = 2;
+
 /// Cells past the liquid whose velocity is needed where nothing moves farther than `reach` cells: a surface follows the flow
 /// as far as it may come.
 pub(super) fn layers(reach: f32) -> i32 {
@@ -204,8 +207,13 @@ pub(super) fn substep(
     }
     let shapes: Vec<_> = around.shapes().collect();
     let others = Others { domain: &settings.domain, solid, shapes: &shapes, time: middle };
-    if let Some(swelling) = remainder::remainder(&flow, surface, &held, &others, reach) {
-        surface.swell(&swelling);
+    let mut remainder = Remainder::of(&flow, &held, &others, reach);
+    // What moves farther ends anywhere, and a second look would add to that.
+    let looks = if reach < FARTHEST { LOOKS } else { 1 };
+    for _ in 0..looks {
+        if let Some(swelling) = remainder.swelling(surface) {
+            surface.swell(&swelling);
+        }
     }
     let passed =
         around.solid.map_or(0.0, |solid| passed_over(&surface.view(), motion, &settings.domain, &flow, (solid, times)));

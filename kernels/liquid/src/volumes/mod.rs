@@ -32,7 +32,7 @@ use crate::carried::{MaterialPoints, PhaseShares};
 use crate::level_set::{Distance, floor};
 use crate::marked::MarkedSurface;
 use crate::rows::CellRows;
-use crate::step::Surface;
+use crate::step::{Owed, REGION, Surface};
 use follow::marked;
 use phases::{Ways, ways_of_phases};
 use pieces::{Measured, PieceCells, Pieces};
@@ -151,6 +151,9 @@ pub struct VolumeReport {
     pub moved: f64,
     /// Pieces that vanished.
     pub lost: Vec<LostPiece>,
+    /// What the surface that is left has to gain for what `lost` is now to be all that went with it
+    /// ([`Liquid::give`](crate::step::Liquid::give)): the cells of a piece hold more than its mesh encloses.
+    pub owed: Vec<Owed>,
 }
 
 /// How much each piece of a liquid should enclose. Kept exactly by any format that keeps numbers.
@@ -264,6 +267,7 @@ impl VolumeTargets {
         let phases = known.as_ref();
         let (unit, size) = (self.unit(surface), f64::from(surface.resolution()));
         let (mut found, mut lost) = self.follow(surface, solid, phases);
+        let mut owed = self.given_twice(&lost, solid);
         let before = self.corrected;
         let (mut cap, mut moved) = (0.5 * (most * size).min(OWN_CAP), 0.0);
         let mut responses = vec![1.0; found.all.len()];
@@ -294,8 +298,8 @@ impl VolumeTargets {
             lost.extend(vanished);
             found = now;
         }
-        lost.extend(self.drop_small(&mut found, surface, solid));
-        let report = self.report(&found, unit, moved, lost);
+        self.drop_small(&mut found, surface, solid, (&mut lost, &mut owed));
+        let report = self.report(&found, unit, moved, (lost, owed));
         VolumeReport { corrected_now: self.corrected - before, ..report }
     }
 
@@ -351,34 +355,50 @@ impl VolumeTargets {
         phases: Option<&PhaseShares>,
     ) -> VolumeReport {
         let (mut found, mut lost) = self.follow(surface, solid, phases);
-        lost.extend(self.drop_small(&mut found, surface, solid));
-        self.report(&found, self.unit(surface), 0.0, lost)
+        let mut owed = self.given_twice(&lost, solid);
+        self.drop_small(&mut found, surface, solid, (&mut lost, &mut owed));
+        self.report(&found, self.unit(surface), 0.0, (lost, owed))
     }
 
-    /// Takes the pieces out of a surface that are too small for its cells.
+    /// What the liquid around has too much of, where pieces vanished as they moved: it got their volume as what the surface did
+    /// not keep, but beside a solid.
+    fn given_twice(&self, lost: &[LostPiece], solid: Option<&Distance<'_>>) -> Vec<Owed> {
+        let is_clear = |piece: &&LostPiece| solid.is_none_or(|solid| solid(piece.place) > REGION as f32);
+        lost.iter().filter(is_clear).map(|piece| (piece.place, self.in_cells(-piece.volume))).collect()
+    }
+
+    /// Takes the pieces out of a surface that are too small for its cells, and adds them to those lost.
     fn drop_small(
         &mut self,
         found: &mut Pieces,
         surface: &mut MarkedSurface,
         solid: Option<&Distance<'_>>,
-    ) -> Vec<LostPiece> {
+        (lost, owed): (&mut Vec<LostPiece>, &mut Vec<Owed>),
+    ) {
         let unit = self.unit(surface);
         let is_small = |(target, piece): (&PieceTarget, &Measured)| {
             let volume = target.volume() / unit;
             piece.volume < SMALLEST && volume < SMALLEST && volume > 0.0
         };
         let small: Vec<bool> = self.pieces.iter().zip(&found.all).map(is_small).collect();
-        let mut lost = Vec::new();
-        for piece in found.take_out(surface, solid, &small) {
+        let (taken, held) = found.take_out(surface, solid, &small);
+        owed.extend(held);
+        for piece in taken {
             let target = &mut self.pieces[piece];
-            lost.extend(target.lost(target.place));
+            let (place, volume) = (target.place, target.volume());
+            lost.extend(target.lost(place));
             target.phases.fill(0.0);
             target.measured = 0.0;
+            owed.push((place, self.in_cells(-volume)));
         }
-        lost
     }
 
-    fn report(&self, found: &Pieces, unit: f64, moved: f64, lost: Vec<LostPiece>) -> VolumeReport {
+    /// A volume, m³, ÷ that of a solver cell.
+    fn in_cells(&self, volume: f64) -> f32 {
+        (volume / (self.cell * self.cell * self.cell)) as f32
+    }
+
+    fn report(&self, found: &Pieces, unit: f64, moved: f64, (lost, owed): (Vec<LostPiece>, Vec<Owed>)) -> VolumeReport {
         let volume = unit * found.volume();
         let target = self.target();
         let errors = self.pieces.iter().map(|piece| piece.measured - piece.volume());
@@ -395,6 +415,7 @@ impl VolumeTargets {
             phase_drift: self.phase_drift(found),
             moved,
             lost,
+            owed,
         }
     }
 

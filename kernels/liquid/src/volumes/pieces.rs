@@ -15,6 +15,7 @@ use crate::marked::MarkedSurface;
 use crate::markers::{Marker, NO_PIECE};
 use crate::rows::{Cell, CellRows, Finder, Periods};
 use crate::sets::Sets;
+use crate::step::Owed;
 
 /// Distance, in cells, up to which φ moves with a shift; beyond, it is made anew from there.
 const NEAR: f32 = 3.0;
@@ -245,13 +246,13 @@ impl Pieces {
     }
 
     /// Takes pieces out of a surface, but for those beside a solid: their liquid goes on in it, and would come back from there.
-    /// Returns those taken, which then enclose nothing.
+    /// Returns those taken, which then enclose nothing, and what the solver's cells no longer hold.
     pub(super) fn take_out(
         &mut self,
         surface: &mut MarkedSurface,
         solid: Option<&Distance<'_>>,
         which: &[bool],
-    ) -> Vec<usize> {
+    ) -> (Vec<usize>, Vec<Owed>) {
         let size = surface.resolution() as f32;
         let is_clear = |cell: &Cell| {
             let middle = cell.map(|x| (x as f32 + 0.5) / size);
@@ -266,14 +267,15 @@ impl Pieces {
         }
         own.iter_mut().filter(|cells| !cells.iter().all(is_clear)).for_each(Vec::clear);
         let taken: Vec<usize> = (0..own.len()).filter(|piece| !own[*piece].is_empty()).collect();
-        if !taken.is_empty() {
-            let is_taken = |piece: u32| own.get(piece as usize).is_some_and(|cells| !cells.is_empty());
-            surface.take_out(&CellRows::from_cells(&own.concat()), is_taken);
+        if taken.is_empty() {
+            return (taken, Vec::new());
         }
+        let is_taken = |piece: u32| own.get(piece as usize).is_some_and(|cells| !cells.is_empty());
+        let held = surface.take_out(&CellRows::from_cells(&own.concat()), is_taken);
         for piece in &taken {
             self.all[*piece] = Measured { place: self.all[*piece].place, ..Measured::default() };
         }
-        taken
+        (taken, held)
     }
 
     /// The piece of each of these cells; [`NO_PIECE`] outside.

@@ -7,7 +7,9 @@ use super::follow::{find_again, take_from};
 use super::*;
 use crate::carried::{LiquidMaterial, MaterialPoints};
 use crate::rows::{Cell, CellRows, Periods};
-use crate::step::{Domain, Liquid, LiquidSettings, LiquidSource, Motion, Moving, SourceShape, Surface, Surroundings};
+use crate::step::{
+    Domain, Liquid, LiquidSettings, LiquidSource, Motion, Moving, SourceShape, Surface, Surroundings, Wall,
+};
 use crate::velocity::{MacVelocity, Site};
 
 const FRAME: f64 = 1.0 / 24.0;
@@ -220,6 +222,39 @@ fn a_piece_smaller_than_a_cell_is_lost_with_its_volume_but_not_beside_a_solid() 
     assert!(targets.correct(&mut surface, Some(&solid)).lost.is_empty());
     let (mut surface, mut targets) = begin(1.3);
     assert!(targets.correct(&mut surface, None).lost.is_empty());
+}
+
+/// The cells of a drop hold more than its mesh encloses: that comes back to the pool, also beside a periodic side.
+#[test]
+fn what_a_lost_piece_held_besides_its_volume_is_owed_to_the_rest() {
+    let closed = Domain::closed([0; 3], [24, 20, 20]);
+    let across = Domain { walls: [[Wall::Periodic; 2], [Wall::Closed; 2], [Wall::Closed; 2]], ..closed };
+    for (domain, x) in [(closed, 14.0), (across, 1.0)] {
+        for resolution in [1, 2] {
+            // In the middle of a surface cell.
+            let (size, half) = (resolution as f32, 0.5 / resolution as f32);
+            let drop = |p: Vec3| {
+                let way = if domain == across { p[0] - 24.0 * (p[0] / 24.0).round() } else { p[0] };
+                ball([x, 14.0, 10.0].map(|x| x + half), 0.8 / size)([way, p[1], p[2]])
+            };
+            let mut surface = MarkedSurface::new(domain, resolution, |p| (p[1] - 6.0).min(drop(p)), 0, 1);
+            let mut targets = VolumeTargets::new(&mut surface, 1.0, None);
+            let cells = CellRows::cuboid(domain.low, domain.high);
+            let held =
+                |surface: &MarkedSurface| surface.shares(&cells).iter().map(|share| f64::from(*share)).sum::<f64>();
+            let before = held(&surface);
+            let report = targets.measure(&mut surface, None, None);
+            let [lost] = &report.lost[..] else { panic!("{report:?}") };
+            let owed: f64 = report.owed.iter().map(|(_, volume)| f64::from(*volume)).sum();
+            let left = held(&surface);
+            let taken = before - left;
+            assert_near(owed + lost.volume, taken, 1e-4);
+            assert!(taken > 2.0 * lost.volume, "{resolution}: {taken} {lost:?}");
+            let mut liquid = Liquid::new(LiquidSettings::new(domain, 1.0), surface);
+            liquid.give(&report.owed);
+            assert_near(held(liquid.surface()) - left, owed, 0.02);
+        }
+    }
 }
 
 #[test]
