@@ -188,11 +188,10 @@ metrics! { METRICS:
     VOLUME_DRIFT_RAW = Metric::new("volume_drift_raw", Unit::None,
         "Relative error that the volume would have if it had never been corrected.")
         .warn_last_outside(-0.03, 0.03, "This share of the liquid's volume was lost (below 0) or gained (above 0) up to this frame because \
-            cells and substeps are too coarse. Of the volume, `volume_correction` has made good {volume_made_good} %, {made_good_now} % in the \
-            frame alone. Where it is on, the volume as a whole is right, but some parts of the liquid are too thick and others too thin. Films, \
-            drops, sheets and jets thinner than two cells lose volume, and so does liquid where it hits a wall, a collider or other liquid. \
-            Away from colliders, sources, sinks and open walls most of it is given back where it was lost; near them, smaller cells, or \
-            `resolution` 2 with `cfl` 1, lose less.");
+            cells and substeps are too coarse, before `volume_correction` made good {volume_made_good} % of the volume, {made_good_now} % in this \
+            frame; 0 if it is off. With it, the volume as a whole is right, but some parts of the liquid are too thick and others too thin. \
+            Films, drops, sheets and jets thinner than two cells enclose more or less than they hold, and near colliders, sources, sinks and \
+            open walls liquid loses volume as it moves: smaller cells, or `resolution` 2 with `cfl` 1, lose less.");
     MADE_GOOD = Metric::new("volume_made_good", Unit::Percent,
         "Volume that correction has added or removed since the start, in percent of the volume.");
     MADE_GOOD_NOW = Metric::new("made_good_now", Unit::Percent,
