@@ -96,7 +96,8 @@ pub struct StudyArgs {
     /// Override a param (node.param=VALUE) or a control (name=VALUE) in all runs; repeatable
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Setting>,
-    /// Cook each setting this many times, in rounds, and take the least time; a search (see --tolerance) repeats only
+    /// Cook each setting this many times, in rounds, and take the least time (both ends of a knob three times where only
+    /// times tell which is the fine one); a search (see --tolerance) repeats only
     /// settings that it may pick [default: 3, fewer where a run takes seconds]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeats: Option<u32>,

@@ -151,8 +151,8 @@ pub struct VolumeReport {
     pub moved: f64,
     /// Pieces that vanished.
     pub lost: Vec<LostPiece>,
-    /// What the surface that is left has to gain for what `lost` is now to be all that went with it
-    /// ([`Liquid::give`](crate::step::Liquid::give)): the cells of a piece hold more than its mesh encloses.
+    /// What the surface that is left has to gain ([`Liquid::give`](crate::step::Liquid::give)): the cells of a dropped piece held
+    /// more than `lost` says, since its mesh enclosed less. Negative where the liquid around has too much.
     pub owed: Vec<Owed>,
 }
 
@@ -360,8 +360,8 @@ impl VolumeTargets {
         self.report(&found, self.unit(surface), 0.0, (lost, owed))
     }
 
-    /// What the liquid around has too much of, where pieces vanished as they moved: it got their volume as what the surface did
-    /// not keep, but beside a solid.
+    /// What the liquid around has too much of after pieces vanished as they moved: unless a solid is near, it was given their volume
+    /// as liquid that the surface did not keep, and they are now spray, too.
     fn given_twice(&self, lost: &[LostPiece], solid: Option<&Distance<'_>>) -> Vec<Owed> {
         let is_clear = |piece: &&LostPiece| solid.is_none_or(|solid| solid(piece.place) > REGION as f32);
         lost.iter().filter(is_clear).map(|piece| (piece.place, self.in_cells(-piece.volume))).collect()
