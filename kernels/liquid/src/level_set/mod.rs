@@ -244,6 +244,21 @@ impl LevelSet {
         self.store(&rows, phi, 0);
     }
 
+    /// Makes a plane between cells the surface where one side of it is liquid and the other is air. Follow with
+    /// [`Self::fill`].
+    pub(crate) fn part_at(&mut self, axis: usize, plane: i32) {
+        let before = self.clone();
+        let (mut low, mut high) = (self.low, self.high);
+        (low[axis], high[axis]) = (plane - BAND as i32, plane + BAND as i32);
+        self.change(low, high, &|place, phi| {
+            let away = place[axis] - plane as f32;
+            let mut opposite = place;
+            opposite[axis] -= 2.0 * away;
+            let other = before.rows().find(opposite.map(|x| x.floor() as i32)).map_or(BAND, |at| before.phi[at]);
+            if (phi < 0.0) == (other < 0.0) { phi } else { phi.abs().min(away.abs()).copysign(phi) }
+        });
+    }
+
     /// Lowers φ of each stored cell by one of `by`, less than the width of a cell. Follow with [`Self::fill`].
     pub(crate) fn lower(&mut self, by: &[f32]) {
         for (phi, by) in self.phi.iter_mut().zip(by) {

@@ -81,12 +81,22 @@ impl MarkedSurface {
         surface
     }
 
-    /// The same between the walls of a domain: where they are periodic, the surface repeats; where they are open, air comes
-    /// in as liquid moves away.
+    /// The same between the walls of a domain: where they are periodic, the surface repeats, and a shape that one of them
+    /// cuts has a surface there; where they are open, air comes in as liquid moves away.
     #[must_use]
     pub fn within(self, domain: &Domain) -> Self {
         let periods = domain.periods().refined(self.resolution);
-        Self { periods, set: self.set.open_at(domain.open_sides()), ..self }
+        let mut surface = Self { periods, set: self.set.open_at(domain.open_sides()), ..self };
+        if periods.any() {
+            surface.among_images(0.0, |markers, set| {
+                let sides = (0..3).flat_map(|axis| [(axis, 0), (axis, periods.0[axis])]);
+                sides.filter(|(axis, _)| periods.0[*axis] > 0).for_each(|(axis, side)| set.part_at(axis, side));
+                set.fill();
+                markers.upkeep(set);
+            });
+            surface.restrict();
+        }
+        surface
     }
 
     /// The level set, in surface cells.

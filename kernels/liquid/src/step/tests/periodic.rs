@@ -4,7 +4,7 @@ use super::plain::Still;
 use super::*;
 use crate::marked::MarkedSurface;
 use crate::rows::Cell;
-use numerics::vector::{add, length, sub};
+use numerics::vector::{add, length, scale, sub};
 
 const REPEATS: [Wall; 2] = [Wall::Periodic; 2];
 const SHUT: [Wall; 2] = [Wall::Closed; 2];
@@ -99,6 +99,36 @@ fn a_drop_returns_after_a_period() {
         after.sort_unstable();
         after.dedup();
         assert_eq!(after.len(), all);
+    }
+}
+
+/// A ball of 3.2 cells radius whose middle is a cell from a periodic side is cut there at the start, and the cut is a
+/// surface like the rest of it as it moves away from the side, or across it.
+#[test]
+fn a_shape_that_a_periodic_side_cuts_keeps_its_volume() {
+    for (axis, resolution, way) in [(0, 1, 6.0), (1, 1, -5.0), (2, 2, 6.0), (0, 1, -5.0)] {
+        let (mut walls, mut middle, mut along) = ([SHUT; 3], [6.0; 3], [0.0; 3]);
+        (walls[axis], middle[axis], along[axis]) = (REPEATS, 1.0, 0.1 * way);
+        let domain = Domain { walls, ..Domain::closed([0; 3], [12; 3]) };
+        let mut liquid = start(domain, resolution, |p| length(sub(p, middle)) - 3.2);
+        liquid.set_velocity(|_| along, &WEIGHTLESS);
+        // A cap of height h of a ball of radius R: πh²(3R − h)/3.
+        let (radius, height) = (3.2_f64, 4.2);
+        let exact = std::f64::consts::PI * height * height * (3.0 * radius - height) / 3.0;
+        for frame in 0..=24 {
+            let volume = volume(&liquid.surface().view(), &domain);
+            assert!((volume / exact - 1.0).abs() < 0.03, "{axis} {way} {frame}: {volume} {exact}");
+            liquid.step_frame(&WEIGHTLESS, 1.0 / 24.0);
+        }
+        // The middle of the cut, which was beside the side.
+        let mut cut = middle;
+        cut[axis] = f32::rem_euclid(way * 25.0 / 24.0, 12.0);
+        let markers = &liquid.surface().markers().markers;
+        let size = resolution as f32;
+        let is_near = |marker: &&crate::markers::Marker| length(sub(scale(marker.point, 1.0 / size), cut)) < 0.8;
+        let near: Vec<_> = markers.iter().filter(is_near).collect();
+        assert!(near.len() >= 2, "{axis} {way}: {} markers", near.len());
+        assert!(near.iter().all(|marker| marker.normal[axis] < -0.99), "{axis} {way}: {near:?}");
     }
 }
 
