@@ -161,6 +161,26 @@ macro_rules! kernel {
             $body($($arg),*)
         }
     };
+    ($(#[$meta:meta])* $vis:vis fn $name:ident <const $n:ident: $number:ty> ($($arg:ident: $type:ty),* $(,)?)
+     $(-> $out:ty)? = $body:path;) => {
+        $(#[$meta])*
+        #[allow(unsafe_code)]
+        $vis fn $name<const $n: $number>(path: $crate::simd::Path, $($arg: $type),*) $(-> $out)? {
+            #[cfg(target_arch = "x86_64")]
+            {
+                #[target_feature(enable = "avx2")]
+                fn avx2<const $n: $number>($($arg: $type),*) $(-> $out)? {
+                    $body($($arg),*)
+                }
+                if path.level() >= $crate::simd::Level::Avx2 {
+                    // SAFETY: a `Path` of this level or above exists only on a CPU with AVX2.
+                    return unsafe { avx2($($arg),*) };
+                }
+            }
+            let _ = path;
+            $body($($arg),*)
+        }
+    };
 }
 pub use kernel;
 

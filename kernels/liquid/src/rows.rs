@@ -300,6 +300,31 @@ impl CellRows {
         })
     }
 
+    /// All cells inside the box `low` ≤ cell < `high` whose distance from one of these in the box is at most `by` cells, and
+    /// few farther ones: a cube around each, and then so many times the neighbours across faces of all that there is. Of
+    /// [`Self::dilated_within`] it is 0.6 around single cells and 0.7 around oblique surfaces.
+    pub fn rounded_within(&self, by: i32, low: Cell, high: Cell) -> Self {
+        // The largest ball in a cube and an octahedron together, where their sizes are as 1 to √2.
+        let cube = (0.41422 * by as f32).ceil() as i32;
+        let mut rows = self.clipped(low, high).dilated_within(cube, low, high);
+        for _ in cube..by {
+            rows = rows.with_neighbours(low, high);
+        }
+        rows
+    }
+
+    /// These cells and those across their faces, inside a box.
+    fn with_neighbours(&self, low: Cell, high: Cell) -> Self {
+        let first = [0, 1].map(|axis| max(self.low[axis] - 1, low[axis + 1]));
+        let end = [0, 1].map(|axis| min(self.low[axis] + self.size[axis] + 1, high[axis + 1]));
+        Self::from_ranges(first, [end[0] - first[0], end[1] - first[1]], |y, z, out| {
+            out.extend(self.row(y, z).iter().map(|span| max(span.start - 1, low[0])..min(span.end + 1, high[0])));
+            for [y, z] in [[y - 1, z], [y + 1, z], [y, z - 1], [y, z + 1]] {
+                out.extend(self.row(y, z).iter().map(|span| max(span.start, low[0])..min(span.end, high[0])));
+            }
+        })
+    }
+
     /// All cells of which one at most 1 lower along every axis is in the set: the cells whose low corner touches it.
     pub fn grown_up(&self) -> Self {
         let [y0, z0] = self.low;

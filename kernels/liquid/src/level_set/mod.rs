@@ -314,8 +314,7 @@ impl LevelSet {
     /// Replaces φ and chooses what is stored: the band, wider by `by` cells, the inside, and a ring around both.
     fn store(&mut self, rows: &CellRows, phi: Vec<f32>, by: i32) {
         let near = rows.filtered(|cell, at| phi[at].abs() < BAND || phi[at] < 0.0 && self.is_near_open(cell));
-        let near = if by > 0 { near.dilated(by) } else { near };
-        let active = near.clipped(self.low, self.high);
+        let active = near.rounded_within(by, self.low, self.high);
         let inside = rows.filtered(|_, at| phi[at] < 0.0).clipped(self.low, self.high);
         let stored = active.dilated(1).union(&inside);
         self.phi = stored.resampled(rows, &phi, BAND);
@@ -451,8 +450,15 @@ pub(crate) fn far_from_surface(reach: f32) -> f32 {
 /// Where a point goes in a step: third order (Ralston 1962).
 #[inline]
 pub(crate) fn displacement(flow: &mut impl FnMut(Vec3) -> Vec3, from: Vec3) -> Vec3 {
+    displacements(flow, from)[1]
+}
+
+/// The same to the second order, by the way half of it on, and to the third.
+#[inline]
+pub(crate) fn displacements(flow: &mut impl FnMut(Vec3) -> Vec3, from: Vec3) -> [Vec3; 2] {
     let first = flow(from);
     let second = flow(add(from, scale(first, 0.5)));
     let third = flow(add(from, scale(second, 0.75)));
-    std::array::from_fn(|axis| (2.0 * first[axis] + 3.0 * second[axis] + 4.0 * third[axis]) * (1.0 / 9.0))
+    let mean = |axis: usize| (2.0 * first[axis] + 3.0 * second[axis] + 4.0 * third[axis]) * (1.0 / 9.0);
+    [second, std::array::from_fn(mean)]
 }

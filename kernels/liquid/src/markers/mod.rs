@@ -36,7 +36,7 @@ use numerics::random::Key;
 use numerics::vector::{Vec3, add, cross, dot, length, perpendicular, scale, sub, unit};
 use serde::{Deserialize, Serialize};
 
-use crate::level_set::{Flow, LevelSet, PhiChange, PhiSampler, PhiView, displacement};
+use crate::level_set::{Flow, LevelSet, PhiChange, PhiSampler, PhiView, displacements};
 use crate::rows::{Cell, Periods};
 use bins::Bins;
 pub(crate) use correct::FARTHEST;
@@ -167,11 +167,13 @@ impl Markers {
         parallel::for_each(self.markers.chunks_mut(CHUNK), |_, markers| {
             let mut reader = flow.reader();
             for marker in markers {
-                let way = displacement(&mut reader, marker.point);
+                let [middle, way] = displacements(&mut reader, marker.point);
                 let first = perpendicular(marker.normal);
                 let [a, b] = [first, cross(marker.normal, first)].map(|tangent| {
-                    let end = displacement(&mut reader, add(marker.point, scale(tangent, TANGENT)));
-                    add(tangent, scale(sub(end, way), 1.0 / TANGENT))
+                    // Normals need no more than the second order.
+                    let start = add(marker.point, scale(tangent, TANGENT));
+                    let half = scale(reader(start), 0.5);
+                    add(tangent, scale(sub(reader(add(start, half)), middle), 1.0 / TANGENT))
                 });
                 let held = flow.held(marker.point, way, 1.0);
                 marker.point = add(marker.point, held.map_or(way, |held| held.way));

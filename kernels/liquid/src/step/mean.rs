@@ -15,7 +15,7 @@ use crate::step::project::{Materials, PressureEquations, Projection};
 use crate::step::sources::Span;
 use crate::step::substep::{FARTHEST, SLOPING_LAYERS, STEEPEST};
 use crate::step::{LiquidReport, LiquidSettings, Splitting, Surface, Surroundings};
-use crate::velocity::{Advection, FaceFields, MacVelocity, Slopes, resampled};
+use crate::velocity::{Advection, FaceFields, MacVelocity, Method, Slopes, resampled};
 
 /// How much the way in a substep has to change for the mean velocity to be another, in cells.
 const LEAST_BEND: f32 = 1e-3;
@@ -195,7 +195,9 @@ impl Start<'_> {
         let [velocity] = motion.continued([half.as_ref().unwrap_or(own)], &rows, slopes, domain, solid);
         let velocity = MacVelocity::new(rows, velocity);
         let (bounds, periods, scheme) = (domain.bounds(), domain.periods(), settings.scheme);
-        let half = Advection { velocity: &velocity, bounds, periods, step: 0.5 * step, scheme };
+        // Half of a way is short enough for the second order.
+        let method = Method::Midpoint;
+        let half = Advection { velocity: &velocity, bounds, periods, step: 0.5 * step, method, scheme };
         let mut faces = half.carry(velocity.faces(), &cells.rows, &cells.moving);
         let own = resampled(&cells.rows, motion.rows(), own);
         for axis in 0..3 {

@@ -162,7 +162,7 @@ impl Motion {
     /// The rows of the velocity and `layers` cells past the liquid.
     pub(super) fn rows_past_liquid(&self, domain: &Domain, layers: i32) -> CellRows {
         let [low, high] = domain.reach(layers + 1);
-        domain.clip_with_images(&self.rows().dilated_within(layers - 1, low, high), layers + 1)
+        domain.clip_with_images(&self.rows().rounded_within(layers - 1, low, high), layers + 1)
     }
 
     /// A velocity on other cells with what the last substep gained, where that is known: liquid at rest and in free fall

@@ -18,7 +18,7 @@ use crate::step::remainder::{self, Others, Remainder};
 use crate::step::sources::{LiquidSink, LiquidSource, SourceShape, Span};
 use crate::step::turned;
 use crate::step::{LiquidReport, LiquidSettings, Splitting};
-use crate::velocity::{Advection, Around, FaceFields, MacVelocity, Sampler, Slopes};
+use crate::velocity::{Advection, Around, FaceFields, MacVelocity, Method, Sampler, Slopes};
 
 /// What is around a liquid.
 #[derive(Clone, Copy)]
@@ -224,7 +224,8 @@ pub(super) fn substep(
     cells.fill_images();
     let carried = exchanged.entered(motion, &velocity, carried, reach);
     let bounds = settings.domain.bounds();
-    let advection = Advection { velocity: &velocity, bounds, periods, step, scheme: settings.scheme };
+    let (method, scheme) = (Method::Ralston, settings.scheme);
+    let advection = Advection { velocity: &velocity, bounds, periods, step, method, scheme };
     let mut faces = advection.carry(carried.as_ref().unwrap_or(velocity.faces()), &cells.rows, &cells.moving);
     exchanged.enter_far(velocity.rows(), &cells, &mut faces);
     let stored_cells = velocity.rows().len();

@@ -8,7 +8,17 @@ use crate::rows::{Cell, CellRows, Periods, PlacedSpan};
 use crate::velocity::batch::{ValuesAround, velocity};
 use crate::velocity::{Around, FaceFields, FaceMask, MacVelocity, Sampler, Site, within};
 
-/// Follows points through a velocity that does not change meanwhile, by Ralston's third-order method (1962).
+/// How points are followed through a velocity that does not change meanwhile.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// By the velocity half of the way on: second order.
+    Midpoint,
+    /// Ralston's third-order method (1962).
+    #[default]
+    Ralston,
+}
+
+/// Follows points through a velocity that does not change meanwhile.
 #[derive(Clone, Debug)]
 pub struct Tracer<'a> {
     velocity: &'a MacVelocity,
@@ -16,19 +26,27 @@ pub struct Tracer<'a> {
     bounds: [Vec3; 2],
     periods: Periods,
     step: f32,
+    method: Method,
 }
 
 impl<'a> Tracer<'a> {
     /// Points stay in the box `bounds`, low corner and high. `step`: cells that a point moves at speed 1, negative to
     /// follow it back.
     pub fn new(velocity: &'a MacVelocity, bounds: [Vec3; 2], step: f32) -> Self {
-        Self { velocity, sampler: Sampler::new(velocity.rows()), bounds, periods: Periods::NONE, step }
+        let (sampler, periods, method) = (Sampler::new(velocity.rows()), Periods::NONE, Method::default());
+        Self { velocity, sampler, bounds, periods, step, method }
     }
 
     /// Points that go out at a side that repeats come in at the other.
     #[must_use]
     pub fn repeating(self, periods: Periods) -> Self {
         Self { periods, ..self }
+    }
+
+    /// By another method than Ralston's.
+    #[must_use]
+    pub fn by(self, method: Method) -> Self {
+        Self { method, ..self }
     }
 
     /// Where points at `starts` go, given the velocity there.
@@ -40,6 +58,9 @@ impl<'a> Tracer<'a> {
     fn trace_lanes(&mut self, starts: &Lanes<3>, a: &Lanes<3>) -> Lanes<3> {
         let b = self.moved(starts, &scaled(a, 0.5));
         let b = velocity(&mut self.sampler, self.velocity.faces(), &b);
+        if self.method == Method::Midpoint {
+            return self.moved(starts, &b);
+        }
         let c = self.moved(starts, &scaled(&b, 0.75));
         let c = velocity(&mut self.sampler, self.velocity.faces(), &c);
         let mut mean = *a;
@@ -117,6 +138,8 @@ pub struct Advection<'a> {
     pub periods: Periods,
     /// Cells moved at speed 1.
     pub step: f32,
+    /// How faces are followed.
+    pub method: Method,
     /// How values are carried.
     pub scheme: Scheme,
 }
@@ -201,7 +224,7 @@ impl Advection<'_> {
     }
 
     fn tracer(&self, step: f32) -> Tracer<'_> {
-        Tracer::new(self.velocity, self.bounds, step).repeating(self.periods)
+        Tracer::new(self.velocity, self.bounds, step).repeating(self.periods).by(self.method)
     }
 
     /// Of each wanted face the value where it came from, and the least and largest value around.

@@ -8,6 +8,7 @@ use std::mem::replace;
 use std::ops::Range;
 
 use numerics::parallel;
+use numerics::simd::{Path, kernel};
 
 use crate::rows::{CellRows, RowSpan};
 use crate::velocity::{ALL_FACES, FaceFields, FaceMask};
@@ -43,6 +44,7 @@ const BESIDE: [[i32; 2]; 12] = [
 
 impl Line {
     /// Where the rows next to it that are stored have its cells.
+    #[inline(always)]
     fn rows_beside(&self) -> impl Iterator<Item = Range<usize>> {
         let rows = (0..BESIDE.len()).step_by(3).filter(|near| self.step[*near] == 1);
         rows.map(|near| self.beside[near] as usize..(self.beside[near] + self.len) as usize)
@@ -80,19 +82,29 @@ impl Slopes {
         Self { steepest, smooth: false }
     }
 
+    /// The slope of each lane, from a neighbour, the one behind it and the third. Without branches: lanes that do not count may
+    /// be anything.
     #[inline(always)]
-    fn of(self, nearest: f32, next: f32) -> f32 {
-        let slope = match self.smooth {
-            true if nearest * next > 0.0 => {
-                let [less, more] = if nearest.abs() < next.abs() { [nearest, next] } else { [next, nearest] };
+    fn of(self, near: &Lanes, behind: &Lanes, third: &Lanes) -> Lanes {
+        let mut slopes = [0.0; 4];
+        for lane in 0..4 {
+            slopes[lane] = near[lane] - behind[lane];
+        }
+        if self.smooth {
+            for lane in 0..4 {
+                let (nearest, next) = (slopes[lane], behind[lane] - third[lane]);
+                let is_less = nearest.abs() < next.abs();
+                let (less, more) = (if is_less { nearest } else { next }, if is_less { next } else { nearest });
                 let rough = 3.0 * (more - less) / (more + less);
-                if rough < 1.0 { less * (1.0 - rough) } else { 0.0 }
+                let counts = (nearest * next > 0.0) & (rough < 1.0);
+                slopes[lane] = if counts { less * (1.0 - rough) } else { 0.0 };
             }
-            true => 0.0,
-            false => nearest,
-        };
-        let slope = if slope > self.steepest { self.steepest } else { slope };
-        if slope < -self.steepest { -self.steepest } else { slope }
+        }
+        for slope in &mut slopes {
+            let bounded = if *slope > self.steepest { self.steepest } else { *slope };
+            *slope = if bounded < -self.steepest { -self.steepest } else { bounded };
+        }
+        slopes
     }
 }
 
@@ -169,10 +181,20 @@ impl<'a, const F: usize> Part<'a, F> {
         for gain in gains {
             let n = gain.at as usize - self.first;
             self.known[n] |= gain.faces;
-            for (field, values) in gain.values.iter().enumerate() {
+            for (own, values) in self.values[n].iter_mut().zip(&gain.values) {
                 for axis in (0..3).filter(|axis| gain.faces >> axis & 1 == 1) {
-                    self.values[n][field][axis] = values[axis];
-                    self.fields[field][axis][n] = values[axis];
+                    own[axis] = values[axis];
+                }
+            }
+        }
+    }
+
+    /// Gives the fields their values back.
+    fn unpack(&mut self) {
+        for (n, values) in self.values.iter().enumerate() {
+            for (lanes, faces) in values.iter().zip(&mut self.fields) {
+                for axis in 0..3 {
+                    faces[axis][n] = lanes[axis];
                 }
             }
         }
@@ -226,7 +248,7 @@ pub fn extrapolate<const F: usize>(
 ) {
     let fits = |faces: &&mut FaceFields<f32>| faces.iter().all(|field| field.len() == rows.len());
     assert!(known.len() == rows.len() && fields.iter().all(fits), "one value a cell");
-    let (lines, nowhere) = (lines(rows), rows.len());
+    let (path, lines, nowhere) = (Path::chosen(), lines(rows), rows.len());
     let chunks = chunks(&lines);
     let mut front = Front::new(&lines);
     // One more place than cells, where nothing is known.
@@ -243,7 +265,7 @@ pub fn extrapolate<const F: usize>(
         let gains: Vec<Gains<F>> = {
             let slopes = if layer < layers { slopes } else { [Slopes::FLAT; F] };
             let layer = Layer { lines: &lines, known: &masks, values: &packed, slopes };
-            parallel::map(&chunks, |_, chunk| layer.gains(chunk, &front.is_near))
+            parallel::map(&chunks, |_, chunk| gains(path, &layer, chunk, &front.is_near))
         };
         if gains.iter().all(|gains| gains.lines.is_empty()) {
             break;
@@ -251,6 +273,7 @@ pub fn extrapolate<const F: usize>(
         update(&mut masks, &mut packed, &|n, mut part| part.apply(&gains[n].cells));
         front.advance(&lines, gains.iter().flat_map(|gains| &gains.lines));
     }
+    update(&mut masks, &mut packed, &|_, mut part| part.unpack());
     known.copy_from_slice(&masks[..nowhere]);
 }
 
@@ -265,7 +288,17 @@ struct Layer<'a, const F: usize> {
     slopes: [Slopes; F],
 }
 
+kernel! {
+    fn gains<const F: usize>(layer: &Layer<'_, F>, chunk: &Range<usize>, is_near: &[bool]) -> Gains<F> = gains_body;
+}
+
+#[inline(always)]
+fn gains_body<const F: usize>(layer: &Layer<'_, F>, chunk: &Range<usize>, is_near: &[bool]) -> Gains<F> {
+    layer.gains(chunk, is_near)
+}
+
 impl<const F: usize> Layer<'_, F> {
+    #[inline(always)]
     fn gains(&self, chunk: &Range<usize>, is_near: &[bool]) -> Gains<F> {
         let mut gains = Gains { cells: Vec::new(), lines: Vec::new() };
         let mut reached = Vec::new();
@@ -288,6 +321,7 @@ impl<const F: usize> Layer<'_, F> {
     }
 
     /// The unknown faces of each cell that have a known neighbour.
+    #[inline(always)]
     fn reach(&self, line: &Line, own: &[FaceMask], reached: &mut Vec<FaceMask>) {
         reached.clear();
         reached.resize(own.len(), 0);
@@ -320,11 +354,9 @@ impl<const F: usize> Layer<'_, F> {
             let (near, behind, third) = (&self.values[near], &self.values[behind], &self.values[third]);
             for (field, slopes) in self.slopes.iter().enumerate() {
                 let linear = if slopes.smooth { triples } else { pairs };
-                let slope = |lane: usize| {
-                    slopes.of(near[field][lane] - behind[field][lane], behind[field][lane] - third[field][lane])
-                };
                 if linear != 0 {
-                    let values = std::array::from_fn(|lane| near[field][lane] + slope(lane));
+                    let rise = slopes.of(&near[field], &behind[field], &third[field]);
+                    let values = std::array::from_fn(|lane| near[field][lane] + rise[lane]);
                     add_lanes(&mut counts[field][0], [1.0; 4], linear);
                     add_lanes(&mut sums[field][0], values, linear);
                 }

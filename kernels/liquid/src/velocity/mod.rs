@@ -12,7 +12,7 @@ mod sampler;
 #[cfg(test)]
 mod tests;
 
-pub use advect::{Advection, Scheme, Tracer};
+pub use advect::{Advection, Method, Scheme, Tracer};
 pub(crate) use around::Around;
 pub use extrapolate::{Slopes, extrapolate};
 pub use sampler::{Corners, Sampler, Site, trilinear};

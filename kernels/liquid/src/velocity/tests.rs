@@ -143,8 +143,9 @@ fn fields_are_carried_with_the_flow() {
         let step = 0.45;
         for _ in 0..10 {
             let bounds = [[0.0; 3], [40.0, 24.0, 24.0]];
-            carried = Advection { velocity: &velocity, bounds, periods: Periods::NONE, step, scheme }
-                .carry(&carried, &rows, &wanted);
+            let (method, periods) = (Method::Ralston, Periods::NONE);
+            let advection = Advection { velocity: &velocity, bounds, periods, step, method, scheme };
+            carried = advection.carry(&carried, &rows, &wanted);
         }
         let mut worst = 0.0_f32;
         for (at, cell) in rows.iter().enumerate().filter(|(_, [x, y, z])| (12..30).contains(x) && y.max(z) < &23) {
@@ -174,6 +175,7 @@ fn any_number_of_threads_gives_the_same_bits() {
                 bounds,
                 periods: Periods::NONE,
                 step: 1.7,
+                method: Method::Ralston,
                 scheme: Scheme::MacCormack,
             };
             let wanted = touching(&liquid, &liquid);
