@@ -301,10 +301,10 @@ impl CellRows {
     }
 
     /// All cells inside the box `low` ≤ cell < `high` whose distance from one of these in the box is at most `by` cells, and
-    /// few farther ones: a cube around each, and then so many times the neighbours across faces of all that there is. Of
-    /// [`Self::dilated_within`] it is 0.6 around single cells and 0.7 around oblique surfaces.
+    /// few farther ones: a cube around each, and then so many times the neighbours of all cells across faces. Around a single cell
+    /// it is two thirds of [`Self::dilated_within`].
     pub fn rounded_within(&self, by: i32, low: Cell, high: Cell) -> Self {
-        // The largest ball in a cube and an octahedron together, where their sizes are as 1 to √2.
+        // A ball fits into a cube of √2 − 1 times its radius and an octahedron of the rest.
         let cube = (0.41422 * by as f32).ceil() as i32;
         let mut rows = self.clipped(low, high).dilated_within(cube, low, high);
         for _ in cube..by {

@@ -128,6 +128,26 @@ fn cells_around_within_a_box_are_those_around_that_it_holds() {
 }
 
 #[test]
+fn cells_around_reach_as_far_as_a_ball_and_little_farther() {
+    let cells = [[0, 0, 0], [5, 2, -3], [6, 2, -3], [9, 9, 9]];
+    let rows = CellRows::from_cells(&cells);
+    let (low, high) = ([-4, -9, -9], [30, 12, 30]);
+    for by in [0, 1, 2, 3, 5, 8] {
+        let rounded = rows.rounded_within(by, low, high);
+        for cell in CellRows::cuboid(low, high).iter() {
+            let square = |other: &Cell| (0..3).map(|axis| (cell[axis] - other[axis]).pow(2)).sum::<i32>();
+            let distance = f64::from(cells.iter().map(square).min().unwrap()).sqrt();
+            let is_in = rounded.find(cell).is_some();
+            assert!(is_in || distance > f64::from(by), "{by} {cell:?}");
+            assert!(!is_in || distance <= 1.2 * f64::from(by) + 0.8, "{by} {cell:?}");
+        }
+        assert_eq!(rounded, rounded.clipped(low, high));
+        assert!(rows.dilated_within(by, low, high).union(&rounded).len() == rows.dilated_within(by, low, high).len());
+    }
+    assert!(rows.rounded_within(2, [20; 3], [30; 3]).is_empty());
+}
+
+#[test]
 fn rows_without_cells_around_a_set_are_not_stored() {
     let cells = ragged();
     let tight = CellRows::from_cells(&cells);
