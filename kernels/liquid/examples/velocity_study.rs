@@ -59,7 +59,14 @@ fn measure() {
     let wanted = stored.tabulate(|cell| if liquid.find(cell).is_some() { 7_u8 } else { 0 });
     for scheme in [Scheme::SemiLagrangian, Scheme::MacCormack] {
         let bounds = [[-1e3; 3], [1e3; 3]];
-        let advection = Advection { velocity: &velocity, bounds, periods: Periods::NONE, step: 1.5, method: Method::Ralston, scheme };
+        let advection = Advection {
+            velocity: &velocity,
+            bounds,
+            periods: Periods::NONE,
+            step: 1.5,
+            method: Method::Ralston,
+            scheme,
+        };
         let time = best(|| drop(advection.carry(velocity.faces(), &stored, &wanted)));
         println!("{scheme:?}: {:.1} ms, {:.0} ns a face", time * 1e3, time * 1e9 / points.len() as f64);
     }
