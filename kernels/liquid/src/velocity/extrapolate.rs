@@ -82,10 +82,10 @@ impl Slopes {
         Self { steepest, smooth: false }
     }
 
-    /// The slope of each lane, from a neighbour, the one behind it and the third. Without branches: lanes that do not count may
-    /// be anything.
+    /// What follows a neighbour, the one behind it and the third, in each lane. Without branches: lanes that do not count may be
+    /// anything.
     #[inline(always)]
-    fn of(self, near: &Lanes, behind: &Lanes, third: &Lanes) -> Lanes {
+    fn after(self, near: &Lanes, behind: &Lanes, third: &Lanes) -> Lanes {
         let mut slopes = [0.0; 4];
         for lane in 0..4 {
             slopes[lane] = near[lane] - behind[lane];
@@ -100,11 +100,12 @@ impl Slopes {
                 slopes[lane] = if counts { less * (1.0 - rough) } else { 0.0 };
             }
         }
-        for slope in &mut slopes {
-            let bounded = if *slope > self.steepest { self.steepest } else { *slope };
-            *slope = if bounded < -self.steepest { -self.steepest } else { bounded };
+        let mut values = *near;
+        for (value, slope) in values.iter_mut().zip(slopes) {
+            let bounded = if slope > self.steepest { self.steepest } else { slope };
+            *value += if bounded < -self.steepest { -self.steepest } else { bounded };
         }
-        slopes
+        values
     }
 }
 
@@ -355,8 +356,7 @@ impl<const F: usize> Layer<'_, F> {
             for (field, slopes) in self.slopes.iter().enumerate() {
                 let linear = if slopes.smooth { triples } else { pairs };
                 if linear != 0 {
-                    let rise = slopes.of(&near[field], &behind[field], &third[field]);
-                    let values = std::array::from_fn(|lane| near[field][lane] + rise[lane]);
+                    let values = slopes.after(&near[field], &behind[field], &third[field]);
                     add_lanes(&mut counts[field][0], [1.0; 4], linear);
                     add_lanes(&mut sums[field][0], values, linear);
                 }
