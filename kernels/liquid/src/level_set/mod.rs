@@ -58,8 +58,9 @@ const LAG: f32 = 0.25;
 /// Cells that a solid moves from which on it may leave behind what was the half of it that liquid is continued into.
 const PASSING: f32 = 0.5;
 
-/// Height above a thin solid up to which a cell may be next to one that goes on from the other side.
-const NEXT_TO: f32 = 0.4;
+/// Height above a thin solid up to which a cell may be next to one that goes on from the other side: half a cell, and half of
+/// what the ways out of both sides differ by where the middle of a cell counts as half-way.
+const NEXT_TO: f32 = 0.61;
 
 /// A distance, in cells, of a place in them; negative inside.
 pub type Distance<'a> = dyn Fn(Vec3) -> f32 + Sync + 'a;
