@@ -118,7 +118,8 @@ fn widest_level() -> Level {
 ///
 /// Compiled for the baseline and AVX2. `kernel! { avx512 pub fn … }` compiles a copy for AVX-512 as well: for kernels that
 /// were measured to run faster so. Most do not, for where lanes are gathered and scattered, sixteen at once take longer
-/// than eight twice, and each copy is compiled in every build.
+/// than eight twice, and each copy is compiled in every build. A function may have one const generic: `kernel! { fn
+/// gains<const F: usize>(…) … }`.
 #[macro_export]
 macro_rules! kernel {
     (avx512 $(#[$meta:meta])* $vis:vis fn $name:ident $(<$life:lifetime>)? ($($arg:ident: $type:ty),* $(,)?)

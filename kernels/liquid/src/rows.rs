@@ -301,8 +301,8 @@ impl CellRows {
     }
 
     /// All cells inside the box `low` ≤ cell < `high` whose distance from one of these in the box is at most `by` cells, and
-    /// few farther ones: a cube around each, and then so many times the neighbours of all cells across faces. Around a single cell
-    /// it is two thirds of [`Self::dilated_within`].
+    /// few farther ones: a cube around each cell, grown by neighbours across faces for the rest of the way. Around a single cell it
+    /// holds two thirds of the cells of [`Self::dilated_within`].
     pub fn rounded_within(&self, by: i32, low: Cell, high: Cell) -> Self {
         // A ball fits into a cube of √2 − 1 times its radius and an octahedron of the rest.
         let cube = (0.41422 * by as f32).ceil() as i32;

@@ -454,7 +454,7 @@ pub(crate) fn displacement(flow: &mut impl FnMut(Vec3) -> Vec3, from: Vec3) -> V
     displacements(flow, from)[1]
 }
 
-/// The same to the second order, by the way half of it on, and to the third.
+/// The same by the midpoint method, to second order, and to third order.
 #[inline]
 pub(crate) fn displacements(flow: &mut impl FnMut(Vec3) -> Vec3, from: Vec3) -> [Vec3; 2] {
     let first = flow(from);

@@ -11,7 +11,7 @@ use crate::velocity::{Around, FaceFields, FaceMask, MacVelocity, Sampler, Site, 
 /// How points are followed through a velocity that does not change meanwhile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
-    /// By the velocity half of the way on: second order.
+    /// The midpoint method, of second order.
     Midpoint,
     /// Ralston's third-order method (1962).
     #[default]
