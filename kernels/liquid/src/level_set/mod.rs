@@ -8,6 +8,7 @@
 //! of the domain φ goes on as it is there, so a surface meets a wall at a right angle; beyond open sides is air. Limit: coordinates beyond 2²⁰
 //! cells lose the digits that place a surface within a cell.
 
+mod contact;
 pub(crate) mod cubic;
 mod fill;
 mod refine;
@@ -17,13 +18,13 @@ mod sides;
 mod tests;
 mod view;
 
-use numerics::vector::{Vec3, add, dot, length, scale, sub};
+use numerics::vector::{Vec3, add, length, scale, sub};
 use serde::{Deserialize, Serialize};
 
+pub use contact::CONTACT;
 pub use refine::refined;
 pub use sample::PhiSampler;
 pub(crate) use sample::floor;
-use sides::may_be_thin;
 pub use sides::{Held, outward};
 pub(crate) use sides::{Sides, held};
 pub use view::PhiView;
@@ -31,36 +32,13 @@ pub(crate) use view::RowBlocks;
 
 use crate::rows::{Cell, CellRows};
 use crate::stencil::Stencil;
+use contact::Contact;
 
 /// Distance, in cells, to which φ is known on either side of the surface; beyond it is this much.
 pub const BAND: f32 = 5.0;
 
-/// Depth in a solid, in cells, to which liquid that touches it goes on.
-pub const CONTACT: f32 = 2.5;
-
-/// Heights above a solid, in cells, at which φ says how it goes on inside.
-const ABOVE: [f32; 2] = [0.5, 1.5];
-
-/// The same above a thin solid: φ between these cells has nothing of what is in it, which may be of the other side.
-const ABOVE_THIN: [f32; 2] = [1.0, 2.0];
-
-/// How φ falls from a solid into the liquid, ÷ its slope: at the first share it does as where a flat surface meets the solid at an
-/// angle, at the second as over liquid that lies against it with all of its surface, which touches it.
-const LEANING: [f32; 2] = [-0.7, -0.9];
-
-/// Depth in a solid up to which φ is the liquid's own.
-const SKIN: f32 = 0.25;
-
-/// How much larger φ may be there than where the liquid above goes on to. A solid holds what touches it, so that air below
-/// liquid that rolls over it would never leave: drops that spread lost 4 % of their volume to it.
-const LAG: f32 = 0.25;
-
 /// Cells that a solid moves from which on it may leave behind what was the half of it that liquid is continued into.
 const PASSING: f32 = 0.5;
-
-/// Height above a thin solid up to which a cell may be next to one that goes on from the other side: half a cell, and half of
-/// what the ways out of both sides differ by where the middle of a cell counts as half-way.
-const NEXT_TO: f32 = 0.61;
 
 /// A distance, in cells, of a place in them; negative inside.
 pub type Distance<'a> = dyn Fn(Vec3) -> f32 + Sync + 'a;
@@ -220,7 +198,9 @@ impl LevelSet {
                         let is_reached = carried <= 0.0 && (*value > 0.0 || may_be_passed);
                         // φ above it is of this side.
                         *value = match if is_reached { flow.held(at, back, -1.0) } else { None } {
-                            Some(held) => sampler.at(add(add(at, held.way), scale(held.normal, ABOVE_THIN[0]))),
+                            Some(held) => {
+                                sampler.at(add(add(at, held.way), scale(held.normal, contact::ABOVE_THIN[0])))
+                            }
                             None => carried,
                         };
                     }
@@ -281,27 +261,15 @@ impl LevelSet {
     }
 
     /// Makes the surface go on into a solid that it wets, to a depth of [`CONTACT`] cells, beyond which there is no liquid.
-    /// `solid` is the distance from it, in cells, negative inside. φ goes on along the normal of the solid as it is
-    /// [`ABOVE`] it, but does not fall towards the outside: a film thinner than a cell then has one surface, not two that
-    /// the grid cannot tell apart, a level pool stays level beside a slope, and liquid under an overhang ends there. In a
-    /// thin solid each half has φ of its own side.
-    pub fn meet(&mut self, solid: &Distance<'_>) {
+    /// `solid` is the distance from it, in cells, negative inside; `face`, the width of the faces that it may leave open, in
+    /// cells. φ goes on as it is above the solid: a film thinner than a cell then has one surface, not two that the grid
+    /// cannot tell apart, and a level pool stays level. In a thin solid each half has φ of its own side.
+    pub fn meet(&mut self, solid: &Distance<'_>, face: f32) {
         let (rows, phi) = (self.rows().clone(), std::mem::take(&mut self.phi));
         let before = PhiView { rows: &rows, phi: &phi, ..self.view() };
-        let start = || PhiSampler::new(before);
-        let [phi] = rows.tabulate_with(start, |sampler, cell, n| {
-            let (at, own) = (cell.map(|x| x as f32 + 0.5), phi[n]);
-            let depth = -solid(at);
-            let value = if depth > CONTACT {
-                own.max(depth - CONTACT)
-            } else if depth >= 0.0 {
-                continued(solid, sampler, at, depth, own)
-            } else if depth > -NEXT_TO && own > 0.0 && own < 1.0 {
-                parted(solid, sampler, at, -depth, own)
-            } else {
-                own
-            };
-            [value.clamp(-BAND, BAND)]
+        let start = || Contact::new(solid, before, face);
+        let [phi] = rows.tabulate_with(start, |contact, cell, n| {
+            [contact.phi(cell.map(|x| x as f32 + 0.5), phi[n]).clamp(-BAND, BAND)]
         });
         self.store(&rows, phi, 0);
     }
@@ -377,70 +345,6 @@ impl LevelSet {
             }
         }
     }
-}
-
-/// φ at a place in a solid, whose distance there is −`depth`, as the liquid outside goes on.
-fn continued(solid: &Distance<'_>, sampler: &mut PhiSampler<'_>, at: Vec3, depth: f32, own: f32) -> f32 {
-    let Some(sides) = Sides::of(solid, at, depth) else { return own };
-    let is_thin = sides.is_thin();
-    let mut of_side = |Sides { normal, depth, .. }: Sides| {
-        let place = add(at, scale(normal, depth));
-        let [at_wall, slope] = match is_thin {
-            true => at_surface(sampler, place, normal),
-            false => at_thick(sampler, place, normal),
-        };
-        at_wall - slope * depth
-    };
-    let own_side = of_side(sides);
-    if is_thin {
-        // What is the liquid's own may be that of the other side.
-        sides.joined([own_side, of_side(sides.other())])
-    } else if depth < SKIN {
-        own.min(own_side + LAG)
-    } else {
-        own_side
-    }
-}
-
-/// φ at a place without liquid, `height` above a solid: without what is on the other side, where that is thin. Else each
-/// shift of the liquid's surface would move it closer, until it came out there.
-fn parted(solid: &Distance<'_>, sampler: &mut PhiSampler<'_>, at: Vec3, height: f32, own: f32) -> f32 {
-    let Some(normal) = outward(solid, at) else { return own };
-    if sampler.at(sub(at, normal)) >= 0.0 || !may_be_thin(solid, at, height, normal) {
-        return own;
-    }
-    let is_film = at_surface(sampler, sub(at, scale(normal, height)), normal)[0] < 0.0;
-    if is_film { own } else { own.max(sampler.at(add(at, normal)).min(1.0)) }
-}
-
-/// φ at a place on a thin solid, and how it falls into it, as it is above. If positive, that at the lower height.
-fn at_surface(sampler: &mut PhiSampler<'_>, place: Vec3, normal: Vec3) -> [f32; 2] {
-    let [near, far] = ABOVE_THIN.map(|height| sampler.at(add(place, scale(normal, height))));
-    let slope = ((far - near) / (ABOVE_THIN[1] - ABOVE_THIN[0])).clamp(0.0, 1.0);
-    let at_wall = near - slope * ABOVE_THIN[0];
-    if at_wall < 0.0 { [at_wall, slope] } else { [near.max(f32::MIN_POSITIVE), 0.0] }
-}
-
-/// φ at a place on a thick solid, and how it falls into it. A flat surface stays flat in it, whether it leans over the liquid or
-/// away: pressure next to it knows where the surface is by φ in the solid, and any other would push liquid that is at rest.
-fn at_thick(sampler: &mut PhiSampler<'_>, place: Vec3, normal: Vec3) -> [f32; 2] {
-    let [near, far] = ABOVE.map(|height| sampler.at(add(place, scale(normal, height))));
-    let mut slope = ((far - near) / (ABOVE[1] - ABOVE[0])).clamp(-1.0, 1.0);
-    if slope < 0.0 {
-        let along = slope_of(sampler, add(place, normal));
-        let share = dot(along, normal) / length(along).max(f32::MIN_POSITIVE);
-        slope *= ((share - LEANING[1]) / (LEANING[0] - LEANING[1])).clamp(0.0, 1.0);
-    }
-    [near - slope * ABOVE[0], slope]
-}
-
-/// The gradient of φ.
-fn slope_of(sampler: &mut PhiSampler<'_>, at: Vec3) -> Vec3 {
-    [0, 1, 2].map(|axis| {
-        let (mut below, mut above) = (at, at);
-        (below[axis], above[axis]) = (at[axis] - 0.5, at[axis] + 0.5);
-        sampler.at(above) - sampler.at(below)
-    })
 }
 
 /// |φ| from which on a cell cannot come next to the surface in a step. φ may fall short of the distance by a fifth.

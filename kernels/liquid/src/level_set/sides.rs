@@ -13,6 +13,16 @@ const FLAT: f32 = 0.5;
 /// Second difference of the distance, over a cell to either side, from which a solid ends on both sides.
 const CREASE: f32 = 0.5;
 
+/// Height above a side at which there is a way to its edge, in cells, and the shares of that way at which it is looked at.
+const HIGH: f32 = 0.5;
+const WAY: [f32; 3] = [0.35, 0.7, 1.0];
+
+/// Depth below a side at which its edge is looked for, in cells.
+const BELOW: f32 = 1.0;
+
+/// Cosine between the ways to both sides above which the solid is a wedge between them.
+const STRAIGHT: f32 = -0.9;
+
 /// The least step, in cells, in looking for the other side.
 const STEP: f32 = 0.25;
 
@@ -94,27 +104,29 @@ pub(crate) struct Sides {
     pub(crate) depth: f32,
     /// How far the other is; infinite where the solid is not thin.
     pub(crate) behind: f32,
+    /// The way to it: unit.
+    across: Vec3,
 }
 
 impl Sides {
     /// Those around a place in a solid whose distance there is −`depth`.
     pub(crate) fn of(solid: &Distance<'_>, at: Vec3, depth: f32) -> Option<Self> {
         let normal = outward(solid, at)?;
-        let behind = behind(solid, at, depth, normal);
+        let (behind, across) = behind(solid, at, depth, normal);
         if behind == f32::INFINITY {
-            return Some(Self { normal, depth, behind });
+            return Some(Self { normal, depth, behind, across });
         }
         // Between the sides of a thin solid its distance is rounded off.
         let ahead = way_out(solid, at, depth, normal).max(depth);
         Some(match ahead <= behind {
-            true => Self { normal, depth: ahead, behind },
-            false => Self { normal: scale(normal, -1.0), depth: behind, behind: ahead },
+            true => Self { normal, depth: ahead, behind, across },
+            false => Self { normal: scale(normal, -1.0), depth: behind, behind: ahead, across: normal },
         })
     }
 
     /// The same seen from the other side.
     pub(crate) fn other(&self) -> Self {
-        Self { normal: scale(self.normal, -1.0), depth: self.behind, behind: self.depth }
+        Self { normal: scale(self.normal, -1.0), depth: self.behind, behind: self.depth, across: self.normal }
     }
 
     /// φ here, given how the liquid of each side goes on, that of the closer side first. Where only one side is wet, the
@@ -134,10 +146,48 @@ impl Sides {
         }
     }
 
+    /// Whether the solid ends within `reach` along its sides, so that liquid goes from one to the other around its rim.
+    pub(super) fn are_at_rim(&self, solid: &Distance<'_>, at: Vec3, reach: f32) -> bool {
+        let [own, other] = [(self.normal, self.depth), (self.across, self.behind)].map(|(way, far)| scale(way, far));
+        let middle = add(at, scale(add(own, other), 0.5));
+        let is_around = |aside: Vec3| {
+            let aside = scale(aside, reach);
+            let sides = [(own, self.normal), (other, self.across)];
+            solid(add(middle, aside)) > 0.0
+                && sides.into_iter().all(|(side, way)| is_free_along(solid, add(at, side), way, aside))
+        };
+        match unit(add(self.normal, self.across)).filter(|_| dot(self.normal, self.across) > STRAIGHT) {
+            Some(between) => is_around(between),
+            None => asides(self.normal).into_iter().any(is_around),
+        }
+    }
+
     /// Whether liquid on one side could reach the other.
     pub(crate) fn is_thin(&self) -> bool {
         self.depth + self.behind < THIN
     }
+}
+
+/// Whether a solid ends within `reach` along the side at a place on it, out of which `normal` points.
+pub(super) fn is_edge(solid: &Distance<'_>, place: Vec3, normal: Vec3, reach: f32) -> bool {
+    let inside = sub(place, scale(normal, BELOW));
+    asides(normal)
+        .map(|aside| scale(aside, reach))
+        .into_iter()
+        .any(|aside| solid(add(inside, aside)) > 0.0 && is_free_along(solid, place, normal, aside))
+}
+
+/// Whether no other solid meets the side at a place on it along a way.
+fn is_free_along(solid: &Distance<'_>, place: Vec3, normal: Vec3, aside: Vec3) -> bool {
+    let above = add(place, scale(normal, HIGH));
+    WAY.into_iter().all(|by| solid(add(above, scale(aside, by))) > 0.0)
+}
+
+/// Four directions along a side.
+fn asides(normal: Vec3) -> [Vec3; 4] {
+    let first = perpendicular(normal);
+    let second = cross(normal, first);
+    [first, scale(first, -1.0), second, scale(second, -1.0)]
 }
 
 /// Whether a solid may be thin behind a place `height` above it, or inside where that is negative. `normal`: out of it there.
@@ -145,25 +195,24 @@ pub(super) fn may_be_thin(solid: &Distance<'_>, at: Vec3, height: f32, normal: V
     solid(sub(at, scale(normal, height.max(0.0) + LOOK))) > -THICK
 }
 
-/// How far it is to the side behind, straight or, where a thin solid ends at another, aslant.
-fn behind(solid: &Distance<'_>, at: Vec3, depth: f32, normal: Vec3) -> f32 {
+/// How far it is to the side behind, straight or, where a thin solid ends at another, aslant, and the way there.
+fn behind(solid: &Distance<'_>, at: Vec3, depth: f32, normal: Vec3) -> (f32, Vec3) {
     let straight = scale(normal, -1.0);
     let far = way_out(solid, at, depth, straight);
     if far < f32::INFINITY || !may_be_thin(solid, at, -depth, normal) {
-        return far;
+        return (far, straight);
     }
-    let first = perpendicular(normal);
-    let second = cross(normal, first);
-    let ways =
-        [first, scale(first, -1.0), second, scale(second, -1.0)].map(|aside| scale(add(straight, aside), ASLANT));
-    let ends = |way: Vec3| {
+    let ways = asides(normal).map(|aside| scale(add(straight, aside), ASLANT));
+    let mut closest = (f32::INFINITY, straight);
+    for way in ways {
         let far = way_out(solid, at, depth, way);
         // Around the edge of a thick solid is no other side.
-        let is_other = far < f32::INFINITY
-            && outward(solid, add(at, scale(way, far))).is_some_and(|out| dot(out, normal) < OPPOSITE);
-        if is_other { far } else { f32::INFINITY }
-    };
-    ways.into_iter().map(ends).fold(f32::INFINITY, f32::min)
+        let is_other = || outward(solid, add(at, scale(way, far))).is_some_and(|out| dot(out, normal) < OPPOSITE);
+        if far < closest.0 && is_other() {
+            closest = (far, way);
+        }
+    }
+    closest
 }
 
 /// How far it is out of a solid in a direction; infinite beyond [`THIN`].

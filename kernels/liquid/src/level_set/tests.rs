@@ -168,7 +168,7 @@ fn met(phi: impl Fn(Vec3) -> f32 + Sync, solid: impl Fn(Vec3) -> f32 + Sync) -> 
     let rows = CellRows::cuboid([0; 3], [20, 20, 6]);
     let phi = rows.tabulate(|cell| phi(cell.map(|x| x as f32 + 0.5)).clamp(-BAND, BAND));
     let mut set = LevelSet::new(&rows, &phi, [0; 3], [20, 20, 6]);
-    set.meet(&solid);
+    set.meet(&solid, 1.0);
     move |cell| set.rows().find(cell).map_or(BAND, |at| set.phi()[at])
 }
 

@@ -291,7 +291,7 @@ impl Surface for MarkedSurface {
     fn meet(&mut self, solid: &Distance<'_>) {
         let (size, unit) = (self.resolution as f32, 1.0 / self.resolution as f32);
         let scaled = |point: Vec3| size * solid(scale(point, unit));
-        self.set.meet(&scaled);
+        self.set.meet(&scaled, size);
         // Those in its inside mark nothing that is seen, or what is seen on the wrong side of a thin one; those that face a
         // side of a thin one are where liquid from one side ends in it.
         let is_seen = |marker: &Marker| {

@@ -122,8 +122,8 @@ fn plate(middle: Vec3, half: Vec3, turn: f32) -> (Vec<[u32; 3]>, Vec<Vec3>) {
     (shape.triangles(), shape.points.iter().map(|p| place(*p)).collect())
 }
 
-/// Where three sheets meet, a drop may come through, depending on where the corner is in its cell: of 120 positions, two lost
-/// more than half a percent, one of them 1.1 %.
+/// Where three sheets meet, a drop may come through, depending on where the corner is in its cell: of 120 positions, the worst
+/// lost 0.11 %, and all together 0.005 %.
 #[test]
 fn an_open_box_of_sheets_holds_syrup() {
     const POSITIONS: u8 = 12;
@@ -138,10 +138,10 @@ fn an_open_box_of_sheets_holds_syrup() {
         let is_outside =
             |p: Vec3| (0..3).any(|axis| p[axis] < low[axis] - 1.25 || axis != 1 && p[axis] > high[axis] + 1.25);
         let leaked = scene.leaked(liquid, is_outside);
-        assert!(leaked < 1e-2, "{shift:?}: {leaked}");
+        assert!(leaked < 2e-3, "{shift:?}: {leaked}");
         sum += leaked;
     }
-    assert!(sum / f64::from(POSITIONS) < 1e-3, "{sum}");
+    assert!(sum / f64::from(POSITIONS) < 2e-4, "{sum}");
 }
 
 #[test]
