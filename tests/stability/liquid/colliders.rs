@@ -74,7 +74,7 @@ pub(super) fn extreme_places_of_colliders_are_met_or_told() {
             "",
         )
         .drift(0.02),
-        row("a plate half a cell above a pool", pool_and(&solid("[0.5, 0.02, 0.5]", "[0.52, 0.59, 0.5]")), met, "")
+        row("a plate a cell above a pool", pool_and(&solid("[0.5, 0.02, 0.5]", "[0.52, 0.59, 0.5]")), met, "")
             .fastest(1e-3)
             .drift(1e-3),
         row("a box whose top is just above a pool", pool_and(&solid("[0.3, 0.3, 0.3]", "[0.6, 0.37, 0.5]")), met, "")

@@ -40,7 +40,8 @@ const ASLANT: f32 = std::f32::consts::FRAC_1_SQRT_2;
 /// Cosine between the ways out of two sides below which one is behind the other.
 const OPPOSITE: f32 = -0.3;
 
-/// Difference between the ways out of both sides, in cells, up to which a place is half-way: no face of its cell is open.
+/// Difference between the ways out of both sides, in cells, up to which a place is half-way: away from edges, next to no face
+/// of its cell is open.
 const MIDDLE: f32 = 0.2;
 
 /// Directions along which a thin solid is looked across: the edges and diagonals of a cube.

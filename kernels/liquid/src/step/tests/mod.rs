@@ -111,6 +111,15 @@ fn kinetic_energy(motion: &Motion, share: impl Fn([i32; 3]) -> f64) -> f64 {
     energy
 }
 
+/// The largest speed in frames of 1/24 s of a liquid that should rest; ÷ g·Δt.
+fn fastest(liquid: &mut Liquid<impl Surface>, around: &Surroundings<'_>, frames: u32) -> f64 {
+    let speed = (0..frames).fold(0.0, |most, _| {
+        liquid.step_frame(around, 1.0 / 24.0);
+        f64::max(most, largest(liquid))
+    });
+    speed * 24.0 / 9.81
+}
+
 /// The largest speed on a face, m/s.
 fn largest(liquid: &Liquid<impl Surface>) -> f64 {
     liquid.motion().largest_speed()

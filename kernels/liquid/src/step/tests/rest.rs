@@ -55,12 +55,7 @@ fn unrest(solid: &(dyn Fn(Vec3) -> f32 + Sync)) -> f64 {
     let mut liquid = Liquid::new(LiquidSettings::new(domain, 0.05), surface);
     let distance = |_: f64, p: Vec3| solid(p);
     let around = Surroundings { solid: Some(Solid::still(&distance)), ..FALLING };
-    let mut speed = 0.0_f64;
-    for _ in 0..48 {
-        liquid.step_frame(&around, 1.0 / 24.0);
-        speed = speed.max(largest(&liquid));
-    }
-    speed * 24.0 / 9.81
+    fastest(&mut liquid, &around, 48)
 }
 
 #[test]
