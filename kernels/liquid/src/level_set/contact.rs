@@ -39,7 +39,7 @@ const LAG: f32 = 0.25;
 const NEXT_TO: f32 = 0.61;
 
 /// Depth below the surface of a solid, in cells, at which its sides are looked for.
-const INTO: f32 = 0.1;
+pub(crate) const INTO: f32 = 0.1;
 
 /// Distance from an edge of a solid within which a face of a cell inside may be open, ÷ the width of a face: half of it, the
 /// width over which a distance that is sampled at cells is rounded off, and some room.

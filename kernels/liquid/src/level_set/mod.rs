@@ -22,6 +22,7 @@ use numerics::vector::{Vec3, add, length, scale, sub};
 use serde::{Deserialize, Serialize};
 
 pub use contact::CONTACT;
+pub(crate) use contact::INTO;
 pub use refine::refined;
 pub use sample::PhiSampler;
 pub(crate) use sample::floor;

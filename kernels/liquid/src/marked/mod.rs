@@ -181,7 +181,7 @@ impl MarkedSurface {
     /// How much of each of some solver cells is liquid.
     pub(crate) fn shares(&self, cells: &CellRows) -> Vec<f32> {
         let domain = self.domain();
-        let shares = Shares::of(self, &domain);
+        let shares = Shares::of(self, &domain, None);
         let [shares] = cells.tabulate_with(|| shares.reader(), |share, cell, _| share(cell, [0.0]).0);
         shares
     }

@@ -1,8 +1,8 @@
 //! The box that a liquid is in.
 
-use numerics::vector::Vec3;
+use numerics::vector::{Vec3, scale, sub};
 
-use crate::level_set::{OpenSides, outward};
+use crate::level_set::{INTO, OpenSides, Sides, outward};
 use crate::open_share::open_share;
 use crate::rows::{Cell, CellRows, Periods};
 use crate::velocity::{FaceFields, Site};
@@ -88,6 +88,19 @@ impl Obstacle<'_> {
     /// How fast it moves, at most, m/s.
     pub(super) fn speed(&self) -> f32 {
         self.solid.speed as f32
+    }
+
+    pub(super) fn is_still(&self) -> bool {
+        self.solid.speed == 0.0
+    }
+
+    /// Whether liquid on the other side of it could reach a place.
+    pub(super) fn is_thin_at(&self, place: Vec3) -> bool {
+        let solid = |point: Vec3| self.distance(point);
+        let Some(normal) = self.normal(place) else { return false };
+        let inside = sub(place, scale(normal, (self.distance(place) + INTO).max(0.0)));
+        let depth = -self.distance(inside);
+        depth > 0.0 && Sides::of(&solid, inside, depth).is_some_and(|sides| sides.is_thin())
     }
 
     /// The unit vector out of it.

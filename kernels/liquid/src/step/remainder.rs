@@ -38,6 +38,13 @@ const WORTH_A_LOOK: f64 = 0.03;
 /// Stretches of cells that are summed each by itself, so that threads may share the work.
 const STRETCHES: usize = 64;
 
+/// Distance from a solid, in cells, up to which what is missing belongs to what is beside the solid, and from which on it does not:
+/// liquid that comes to a stop there gives up its place to none that still moves.
+const BESIDE_SOLID: [f32; 2] = [3.0, 6.0];
+
+/// Distance from a solid, in cells, up to which it is looked at for whether it is thin.
+const THIN: f32 = 1.5;
+
 /// Cells, besides its way, within which liquid comes in or goes by other ways: through an open side, a source or a sink.
 const BESIDE: f32 = 2.0;
 
@@ -53,12 +60,12 @@ pub(super) struct Held {
 
 impl Held {
     /// `rows`: the cells of a velocity that moves nothing farther than `reach` cells.
-    pub(super) fn of(rows: &CellRows, surface: &dyn Surface, domain: &Domain, reach: f32) -> Self {
+    pub(super) fn of(rows: &CellRows, surface: &dyn Surface, others: &Others<'_>, reach: f32) -> Self {
         // A surface on smaller cells has sheets too thin to be liquid for the velocity, which may be far from what is.
         let view = surface.view();
         let beyond = view.rows.filtered(|cell, at| view.phi[at] < WHOLE && rows.find(cell).is_none());
         let rows = rows.union(&beyond.dilated(reach.ceil() as i32 + 1));
-        let shares = Shares::of(surface, domain);
+        let shares = Shares::of(surface, others.domain, others.counted());
         let [volume, x, y, z] = rows.tabulate_with(
             || shares.reader(),
             |share, cell, _| {
@@ -79,12 +86,27 @@ pub(super) struct Others<'a> {
     pub domain: &'a Domain,
     /// At the end of the substep.
     pub solid: Option<Obstacle<'a>>,
+    /// Whether cells beside the solid hold what flows to them. Not where it moves, and not of a viscous liquid, which stays on it in films
+    /// whose mesh encloses more than cells hold.
+    pub is_counted: bool,
     /// Sources and sinks, and when.
     pub shapes: &'a [SourceShape<'a>],
     pub time: f64,
 }
 
-impl Others<'_> {
+impl<'a> Others<'a> {
+    /// The solid beside which cells hold what flows to them.
+    pub(super) fn counted(&self) -> Option<Obstacle<'a>> {
+        self.solid.filter(|_| self.is_counted)
+    }
+
+    /// Whether a solid within `reach` cells of a place takes or brings liquid there. One that counts does so only where it is thin: liquid on
+    /// its other side may be of the same region.
+    fn is_other(&self, solid: Obstacle<'_>, place: Vec3, reach: f32) -> bool {
+        let height = solid.distance(place);
+        if self.is_counted { height.abs() < THIN && solid.is_thin_at(place) } else { height < reach }
+    }
+
     /// Whether one is within `reach` cells of a cell.
     fn are_near(&self, cell: Cell, reach: f32) -> bool {
         let Self { domain, shapes, time, .. } = self;
@@ -100,7 +122,7 @@ impl Others<'_> {
         };
         (0..3).any(is_open)
             || shapes.iter().any(within)
-            || self.solid.is_some_and(|solid| solid.distance(place) < reach)
+            || self.solid.is_some_and(|solid| self.is_other(solid, place, reach))
     }
 }
 
@@ -112,7 +134,7 @@ pub(super) struct Remainder<'a> {
     held: &'a Held,
     others: &'a Others<'a>,
     reach: f32,
-    regions: Regions,
+    regions: Regions<'a>,
     lack: Lack,
     /// What cells held when they were last counted; empty before.
     counted: Vec<f32>,
@@ -122,7 +144,7 @@ pub(super) struct Remainder<'a> {
 
 impl<'a> Remainder<'a> {
     pub(super) fn of(flow: &'a Moving<'a>, held: &'a Held, others: &'a Others<'a>, reach: f32) -> Self {
-        let regions = Regions::of(&held.rows, others.domain);
+        let regions = Regions::of(&held.rows, others.domain, others.counted());
         let lack = Lack::none(&regions);
         Self { flow, held, others, reach, regions, lack, counted: Vec::new(), farthest: f64::INFINITY }
     }
@@ -142,7 +164,7 @@ impl<'a> Remainder<'a> {
     /// Takes what cells hold now from what is missing, in place of what they held when they were last counted.
     fn count(&mut self, surface: &dyn Surface) {
         let Self { flow, held, others, reach, regions, .. } = &*self;
-        let (shares, is_first) = (Shares::of(surface, others.domain), self.counted.is_empty());
+        let (shares, is_first) = (Shares::of(surface, others.domain, others.counted()), self.counted.is_empty());
         let parts = held.rows.map_stretches(STRETCHES, |spans| {
             let (mut share, mut way) = (shares.reader(), flow.reader());
             let [mut near, mut near_before, mut near_now] = [(); 3].map(|()| regions.reader());
@@ -155,19 +177,16 @@ impl<'a> Remainder<'a> {
                 let is_new = came != 0.0 || is_first && more.max(before) > 0.0;
                 let is_apart = is_new && others.are_near(cell, reach + BESIDE);
                 if gain != 0.0 || is_apart {
-                    for (at, weight) in near(Site::Centre.of(cell)) {
-                        lack.area[at] += weight * f64::from(gain);
-                        lack.is_apart[at] |= is_apart;
-                    }
+                    let place = near(Site::Centre.of(cell));
+                    place.add(&mut lack.area, f64::from(gain));
+                    place.at.into_iter().for_each(|(at, _)| lack.is_apart[at] |= is_apart);
                 }
                 if before > 0.0 {
-                    let of_regions = near_before(held.middle(n)).into_iter();
-                    of_regions.for_each(|(at, weight)| lack.volume[at] += weight * f64::from(before));
+                    near_before(held.middle(n)).add(&mut lack.volume, f64::from(before));
                 }
                 if came != 0.0 {
                     let halfway = sub(middle, scale(way(middle), 0.5));
-                    let of_regions = near_now(sub(middle, way(halfway))).into_iter();
-                    of_regions.for_each(|(at, weight)| lack.volume[at] -= weight * f64::from(came));
+                    near_now(sub(middle, way(halfway))).add(&mut lack.volume, -f64::from(came));
                 }
             }
             (lack, counted)
@@ -196,7 +215,7 @@ pub(super) fn given<'a>(
     if owed.is_empty() || rows.is_empty() {
         return None;
     }
-    let shares = Shares::of(surface, domain);
+    let shares = Shares::of(surface, domain, None);
     let [gain] = rows.tabulate_with(
         || shares.reader(),
         |share, cell, _| {
@@ -204,29 +223,31 @@ pub(super) fn given<'a>(
             [(more - less) / (2.0 * WAY)]
         },
     );
-    let regions = Regions::of(rows, domain);
+    let regions = Regions::of(rows, domain, None);
     let (mut lack, mut near) = (Lack::none(&regions), regions.reader());
     for (cell, gain) in rows.iter().zip(gain).filter(|(_, gain)| *gain != 0.0) {
-        near(Site::Centre.of(cell)).into_iter().for_each(|(at, weight)| lack.area[at] += weight * f64::from(gain));
+        near(Site::Centre.of(cell)).add(&mut lack.area, f64::from(gain));
     }
     for (place, volume) in owed {
-        near(*place).into_iter().for_each(|(at, weight)| lack.volume[at] += weight * f64::from(*volume));
+        near(*place).add(&mut lack.volume, f64::from(*volume));
     }
     swelling(&lack.ways(&regions), &regions, rows, surface, domain)
 }
 
-/// Regions of the domain, each with a weight that falls linearly from its middle to those of the regions beside.
-struct Regions {
+/// Regions of the domain, each with a weight that falls linearly from its middle to those of the regions beside. In each, what is beside a
+/// solid and what is not have an account of their own.
+struct Regions<'a> {
     cells: CellRows,
+    solid: Option<Obstacle<'a>>,
     /// Cells along a region's sides.
     width: Vec3,
     /// After how many regions they repeat.
     periods: Periods,
 }
 
-impl Regions {
+impl<'a> Regions<'a> {
     /// Those of `rows`, and those beside.
-    fn of(rows: &CellRows, domain: &Domain) -> Self {
+    fn of(rows: &CellRows, domain: &Domain, solid: Option<Obstacle<'a>>) -> Self {
         let cells = domain.periods().0;
         let periods = cells.map(|period| if period > 0 { ((period + SIZE / 2) / SIZE).max(1) } else { 0 });
         let width = [0, 1, 2].map(|axis| match periods[axis] {
@@ -248,7 +269,7 @@ impl Regions {
         });
         let (stored, periods) = (stored.dilated(1), Periods(periods));
         let cells = if periods.any() { periods.gathered(stored) } else { stored };
-        Self { cells, width, periods }
+        Self { cells, solid, width, periods }
     }
 
     /// A region and those beside it, where they are stored.
@@ -258,7 +279,7 @@ impl Regions {
     }
 
     /// The regions around a place in cells, and their weights. Fast where successive places are near each other.
-    fn reader(&self) -> impl FnMut(Vec3) -> [(usize, f64); 8] + use<'_> {
+    fn reader(&self) -> impl FnMut(Vec3) -> Weights + use<'_> {
         let (mut last, mut at_corners) = ([i32::MIN; 3], [None; 8]);
         move |place| {
             let at = [0, 1, 2].map(|axis| place[axis] / self.width[axis] - 0.5);
@@ -272,17 +293,40 @@ impl Regions {
                     self.cells.find(self.periods.home(region))
                 });
             }
-            std::array::from_fn(|k| {
+            let at = std::array::from_fn(|k| {
                 let along = |axis: usize| if side(k)[axis] == 1 { t[axis] } else { 1.0 - t[axis] };
                 at_corners[k].map_or((0, 0.0), |at| (at, along(0) * along(1) * along(2)))
-            })
+            });
+            let [near, far] = BESIDE_SOLID;
+            let beside = self.solid.map_or(0.0, |solid| ((far - solid.distance(place)) / (far - near)).clamp(0.0, 1.0));
+            Weights { at, beside: f64::from(beside), regions: self.cells.len() }
         }
+    }
+}
+
+/// What a place counts for in the regions around it.
+struct Weights {
+    at: [(usize, f64); 8],
+    /// The share that counts for what is beside a solid.
+    beside: f64,
+    regions: usize,
+}
+
+impl Weights {
+    /// Where each region is in what has one value for each, and then one for what is beside a solid in each; and its weight.
+    fn iter(&self) -> impl Iterator<Item = (usize, f64)> {
+        let parts = [(0, 1.0 - self.beside), (self.regions, self.beside)].into_iter().filter(|(_, share)| *share > 0.0);
+        parts.flat_map(|(first, share)| self.at.iter().map(move |(at, weight)| (first + at, share * weight)))
+    }
+
+    fn add(&self, sums: &mut [f64], value: f64) {
+        self.iter().for_each(|(at, weight)| sums[at] += weight * value);
     }
 }
 
 /// What regions lack.
 struct Lack {
-    /// The volume that is missing in each, ÷ cell³.
+    /// The volume that is missing in each, and then beside a solid in each; ÷ cell³.
     volume: Vec<f64>,
     /// What each gains by a way outward, ÷ that and cell².
     area: Vec<f64>,
@@ -291,9 +335,9 @@ struct Lack {
 }
 
 impl Lack {
-    fn none(regions: &Regions) -> Self {
+    fn none(regions: &Regions<'_>) -> Self {
         let len = regions.cells.len();
-        Self { volume: vec![0.0; len], area: vec![0.0; len], is_apart: vec![false; len] }
+        Self { volume: vec![0.0; 2 * len], area: vec![0.0; 2 * len], is_apart: vec![false; len] }
     }
 
     fn add(&mut self, other: &Self) {
@@ -303,22 +347,26 @@ impl Lack {
     }
 
     /// How far the surface in each region swells, in cells.
-    fn ways(&self, regions: &Regions) -> Vec<f64> {
+    fn ways(&self, regions: &Regions<'_>) -> Vec<f64> {
         let Self { volume, area, is_apart } = self;
-        let counted = || regions.cells.iter().enumerate().filter(|(at, _)| !is_apart[*at]);
+        let len = regions.cells.len();
+        let counted = || {
+            let own = regions.cells.iter().enumerate().filter(|(at, _)| !is_apart[*at]);
+            own.flat_map(|(at, region)| [(0, at, region), (len, len + at, region)])
+        };
         let mut ways = vec![0.0; volume.len()];
         let (mut left, mut surface) = (0.0, 0.0);
-        for (at, region) in counted() {
-            let beside = regions.around(region).filter(|at| !is_apart[*at]);
+        for (first, at, region) in counted() {
+            let around = regions.around(region).filter(|at| !is_apart[*at]).map(|at| first + at);
             let (missing, room) =
-                beside.fold((0.0, 0.0), |(volumes, areas), at| (volumes + volume[at], areas + area[at]));
+                around.fold((0.0, 0.0), |(volumes, areas), at| (volumes + volume[at], areas + area[at]));
             let usual = if room > LEAST_SURFACE { missing / room } else { 0.0 };
             ways[at] = (volume[at] + LITTLE_SURFACE * usual) / (area[at] + LITTLE_SURFACE);
             left += volume[at] - ways[at] * area[at];
             surface += area[at];
         }
         let everywhere = left / f64::max(surface, LEAST_SURFACE);
-        counted().for_each(|(at, _)| ways[at] = (ways[at] + everywhere).clamp(-MOST, MOST));
+        counted().for_each(|(_, at, _)| ways[at] = (ways[at] + everywhere).clamp(-MOST, MOST));
         ways
     }
 }
@@ -326,7 +374,7 @@ impl Lack {
 /// How far a surface swells if it does by `ways`, in cells, in the middle of each region; `None` where that is nothing.
 fn swelling<'a>(
     ways: &[f64],
-    regions: &Regions,
+    regions: &Regions<'_>,
     rows: &'a CellRows,
     surface: &dyn Surface,
     domain: &Domain,
@@ -342,7 +390,7 @@ fn swelling<'a>(
             if phi.abs() > NEAR {
                 return [0.0];
             }
-            [near(Site::Centre.of(cell)).into_iter().fold(0.0, |sum, (at, weight)| sum + weight * ways[at]) as f32]
+            [near(Site::Centre.of(cell)).iter().fold(0.0, |sum, (at, weight)| sum + weight * ways[at]) as f32]
         },
     );
     Some(Swelling::new(rows, by, domain))
@@ -361,6 +409,8 @@ mod tests {
     /// All of it belongs to the same eight regions.
     const DOMAIN: Domain = Domain::closed([12; 3], [32; 3]);
 
+    const NONE: Others<'_> = Others { domain: &DOMAIN, solid: None, is_counted: false, shapes: &[], time: 0.0 };
+
     fn ball(middle: Vec3, radius: f32) -> MarkedSurface {
         MarkedSurface::new(DOMAIN, 1, |p| length(sub(p, middle)) - radius, 0, 1)
     }
@@ -375,7 +425,7 @@ mod tests {
         let middle = [21.2, 22.1, 21.7];
         let rows = CellRows::cuboid(DOMAIN.low, DOMAIN.high);
         let before = ball(middle, 5.2);
-        let held = Held::of(&rows, &before, &DOMAIN, 1.5);
+        let held = Held::of(&rows, &before, others, 1.5);
         let mut after = ball(add(middle, [1.5, 0.0, 0.0]), 5.0);
         let len = rows.len();
         let velocity = MacVelocity::new(rows, [vec![1.5; len], vec![0.0; len], vec![0.0; len]]);
@@ -392,7 +442,7 @@ mod tests {
 
     #[test]
     fn a_ball_gets_back_what_it_has_lost() {
-        let returned = returned(&Others { domain: &DOMAIN, solid: None, shapes: &[], time: 0.0 });
+        let returned = returned(&NONE);
         assert!((returned - 1.0).abs() < 0.04, "{returned}");
     }
 
@@ -402,7 +452,7 @@ mod tests {
         let sheet = |p: Vec3| (p[1] - 30.1).abs() - 0.375;
         let surface = MarkedSurface::new(DOMAIN, 2, |p| (length(sub(p, [22.0; 3])) - 4.0).min(sheet(p)), 0, 1);
         let rows = CellRows::cuboid([16; 3], [28, 22, 28]);
-        let held = Held::of(&rows, &surface, &DOMAIN, 1.5);
+        let held = Held::of(&rows, &surface, &NONE, 1.5);
         let sum: f64 = held.volume.iter().map(|volume| f64::from(*volume)).sum();
         let volume = 0.75 * 20.0 * 20.0 + 4.0 / 3.0 * std::f64::consts::PI * 64.0;
         assert!((sum / volume - 1.0).abs() < 0.01, "{sum} {volume}");
@@ -417,15 +467,14 @@ mod tests {
             high: [30, 32, 32],
             ..DOMAIN
         };
-        let none = Others { domain: &DOMAIN, solid: None, shapes: &[], time: 0.0 };
         let (floor, drain) =
             (|_: f64, p: Vec3| p[1] - 15.0, |_: f64, p: Vec3| length(sub(p, [22.0, 28.0, 22.0])) - 1.0);
         let shapes = [SourceShape { distance: &drain, bounds: [[21, 27, 21], [23, 29, 23]] }];
         let solid = Solid::still(&floor);
         for others in [
-            Others { domain: &open, ..none },
-            Others { solid: Some(solid.at(0.0)), ..none },
-            Others { shapes: &shapes, ..none },
+            Others { domain: &open, ..NONE },
+            Others { solid: Some(solid.at(0.0)), ..NONE },
+            Others { shapes: &shapes, ..NONE },
         ] {
             assert_eq!(returned(&others), 0.0);
         }
@@ -442,21 +491,43 @@ mod tests {
         assert!((gained / 12.0 - 1.0).abs() < 0.03, "{gained}");
     }
 
-    /// Dams that break in a closed box, without any correction (NUMERICS, closed box).
+    /// The largest drift of the volume of a dam, `width` cells wide, in a closed box, perhaps with a solid, without any
+    /// correction (NUMERICS, closed box).
+    fn drift(resolution: u32, width: f32, solid: Option<&(dyn Fn(Vec3) -> f32 + Sync)>) -> f64 {
+        let domain = Domain::closed([0; 3], [24, 16, 6]);
+        let distance = |_: f64, p: Vec3| solid.map_or(f32::INFINITY, |solid| solid(p));
+        let mut around = Surroundings::new(&|_| [0.0, -9.81, 0.0], &|_| 0.0);
+        around.solid = solid.map(|_| Solid::still(&distance));
+        let mut surface = MarkedSurface::new(domain, resolution, |p| (p[0] - width).max(p[1] - 12.0), 0, 1);
+        let solid = |p: Vec3| distance(0.0, p);
+        surface.meet(&solid);
+        let volume = |surface: &MarkedSurface| surface.volume(domain.low, domain.high, Some(&solid));
+        let start = volume(&surface);
+        let mut liquid = Liquid::new(LiquidSettings::new(domain, 0.02), surface);
+        (0..60).fold(0.0, |most, _| {
+            liquid.step_frame(&around, 1.0 / 24.0);
+            f64::max(most, (volume(liquid.surface()) / start - 1.0).abs())
+        })
+    }
+
     #[test]
     fn a_closed_box_keeps_its_volume() {
-        let domain = Domain::closed([0; 3], [24, 16, 6]);
-        let around = Surroundings::new(&|_| [0.0, -9.81, 0.0], &|_| 0.0);
         for (resolution, width, most) in [(1, 9.0, 0.03), (2, 9.0, 0.02), (2, 9.05, 0.02), (2, 9.2, 0.02)] {
-            let dam = |p: Vec3| (p[0] - width).max(p[1] - 12.0);
-            let mut liquid =
-                Liquid::new(LiquidSettings::new(domain, 0.02), MarkedSurface::new(domain, resolution, dam, 0, 1));
-            let volume = |liquid: &Liquid<MarkedSurface>| liquid.surface().volume(domain.low, domain.high, None);
-            let start = volume(&liquid);
-            for frame in 1..=60 {
-                liquid.step_frame(&around, 1.0 / 24.0);
-                let drift = volume(&liquid) / start - 1.0;
-                assert!(drift.abs() < most, "{resolution}, {width}, {frame}: {drift}");
+            let drift = drift(resolution, width, None);
+            assert!(drift < most, "{resolution}, {width}: {drift}");
+        }
+    }
+
+    /// A post, a ball on the floor, and a slope; each cuts cells.
+    #[test]
+    fn a_closed_box_keeps_its_volume_around_a_solid() {
+        let post = |p: Vec3| (p[0] - 15.3).abs().max((p[2] - 3.2).abs()) - 1.4;
+        let ball = |p: Vec3| length(sub(p, [15.0, 1.7, 3.1])) - 2.6;
+        let slope = |p: Vec3| (p[1] - 0.3 * p[0] + 2.0) * 0.957_8;
+        for (name, solid) in [("post", &post as &(dyn Fn(Vec3) -> f32 + Sync)), ("ball", &ball), ("slope", &slope)] {
+            for resolution in [1, 2] {
+                let drift = drift(resolution, 9.0, Some(solid));
+                assert!(drift < 0.02, "{name}, {resolution}: {drift}");
             }
         }
     }

@@ -1,11 +1,11 @@
 //! How much of cells is liquid.
 
-use numerics::vector::{Vec3, add};
+use numerics::vector::{Vec3, add, dot, length, scale};
 
 use crate::level_set::PhiView;
 use crate::rows::{Cell, Finder};
 use crate::step::Surface;
-use crate::step::domain::Domain;
+use crate::step::domain::{Domain, Obstacle};
 use crate::velocity::{Site, trilinear};
 
 /// |φ| of a cell, in cells, from which on it is all liquid or all air.
@@ -13,6 +13,9 @@ pub(super) const WHOLE: f32 = 1.0;
 
 /// How far from the middle of a surface cell, in surface cells along each axis, the 2³ places are where it is looked at.
 const ASIDE: f32 = 0.25;
+
+/// Distance of the middle of a cell from a solid, in cells, up to which that may cover some of its parts.
+const CUT: f32 = 1.25;
 
 /// |φ″| along an axis, ÷ surface cell, up to which φ is curved, and from which on it is creased, as in the middle of a film.
 const CURVED: f32 = 0.75;
@@ -24,9 +27,10 @@ pub(super) fn inner(domain: &Domain, cell: Cell) -> Cell {
     [0, 1, 2].map(|axis| home[axis].clamp(domain.low[axis], domain.high[axis] - 1))
 }
 
-/// How much of cells is liquid.
+/// How much of cells is liquid, without what is in a solid.
 pub(crate) struct Shares<'a> {
     domain: &'a Domain,
+    solid: Option<Obstacle<'a>>,
     /// φ of the surface.
     view: PhiView<'a>,
     /// The same on its own cells, and how many of these lie along a cell's edge.
@@ -35,9 +39,9 @@ pub(crate) struct Shares<'a> {
 }
 
 impl<'a> Shares<'a> {
-    pub(crate) fn of(surface: &'a dyn Surface, domain: &'a Domain) -> Self {
+    pub(crate) fn of(surface: &'a dyn Surface, domain: &'a Domain, solid: Option<Obstacle<'a>>) -> Self {
         let (finest, fine) = surface.finest_view();
-        Self { domain, view: surface.view(), finest, fine }
+        Self { domain, solid, view: surface.view(), finest, fine }
     }
 
     /// The shares of a cell that are liquid if the surface moves outward by so many cells, and the middle of the first of them, in
@@ -46,32 +50,45 @@ impl<'a> Shares<'a> {
         let (coarse, around) = (Finder::new(self.view.rows), self.around());
         let mut near = Vec::new();
         let (fine, size) = (self.fine as usize, self.fine as usize + 2);
-        let part = 2.0 * fine as f32;
+        let unit = fine as f32;
         move |cell, outward| {
             let phi = coarse.find(cell).map_or(self.view.outside, |at| self.view.phi[at]);
-            if phi.abs() > WHOLE || !self.domain.contains(cell) {
-                let is_whole = phi < 0.0 && self.domain.contains(cell);
+            let height = self
+                .solid
+                .filter(|_| phi <= WHOLE)
+                .map_or(f32::INFINITY, |solid| solid.distance(Site::Centre.of(cell)));
+            let phi_outside = phi.max(-height);
+            if phi_outside.abs() > WHOLE || !self.domain.contains(cell) {
+                let is_whole = phi_outside < 0.0 && self.domain.contains(cell);
                 return ([if is_whole { 1.0 } else { 0.0 }; N], Site::Centre.of(cell));
             }
             around(cell, &mut near);
+            let solid = self.solid.filter(|_| height < CUT);
             let (mut sums, mut moment) = ([0.0; N], [0.0; 3]);
             for n in 0..fine * fine * fine {
                 let own = [n % fine, n / fine % fine, n / fine / fine];
                 let [x, y, z] = own.map(|along| along + 1);
-                let phi = parts(&near, x + size * (y + size * z), [1, size, size * size]);
-                for (k, phi) in phi.into_iter().enumerate() {
-                    let shares = outward.map(|outward| (0.5 + part * outward - 2.0 * phi).clamp(0.0, 1.0));
+                let (phi, places) = (parts(&near, x + size * (y + size * z), [1, size, size * size]), places(own));
+                let height = solid.map(|solid| places.map(|place| self.height(solid, cell, place)));
+                let aligned = height.map_or(0.0, |height| cosine(&phi, &height));
+                for (k, place) in places.into_iter().enumerate() {
+                    let free = height.map_or(1.0, |height| 1.0 - share_below(height[k]));
+                    let shares =
+                        outward.map(|outward| share_of_both(share_below(phi[k] - unit * outward), free, aligned));
                     (0..N).for_each(|n| sums[n] += shares[n]);
-                    for axis in 0..3 {
-                        let place = own[axis] as f32 + 0.5 + if k >> axis & 1 == 1 { ASIDE } else { -ASIDE };
-                        moment[axis] += shares[0] * place;
-                    }
+                    (0..3).for_each(|axis| moment[axis] += shares[0] * place[axis]);
                 }
             }
             let middle = moment.map(|moment| moment / (sums[0].max(f32::MIN_POSITIVE) * fine as f32));
             let middle = if sums[0] > 0.0 { middle } else { [0.5; 3] };
             (sums.map(|sum| sum / (8 * fine * fine * fine) as f32), add(cell.map(|x| x as f32), middle))
         }
+    }
+
+    /// The height of a place in surface cells of a cell above a solid, in surface cells.
+    fn height(&self, solid: Obstacle<'_>, cell: Cell, place: Vec3) -> f32 {
+        let fine = self.fine as f32;
+        fine * solid.distance(add(cell.map(|x| x as f32), scale(place, 1.0 / fine)))
     }
 
     /// φ of the surface cells of a cell and those around, x fastest.
@@ -104,6 +121,39 @@ impl<'a> Shares<'a> {
     }
 }
 
+/// The middles of the 2³ parts of a surface cell, x fastest.
+fn places(own: [usize; 3]) -> [Vec3; 8] {
+    std::array::from_fn(|part| {
+        [0, 1, 2].map(|axis| own[axis] as f32 + 0.5 + if part >> axis & 1 == 1 { ASIDE } else { -ASIDE })
+    })
+}
+
+/// The share of a part of a surface cell that is below a surface, at this distance from its middle in surface cells.
+fn share_below(distance: f32) -> f32 {
+    (0.5 - 2.0 * distance).clamp(0.0, 1.0)
+}
+
+/// The share of a part of a surface cell that is `below` a surface and `free` of a solid, where these are the shares of each alone.
+/// `aligned`: the cosine of the angle between their ways out, 1 in a film on the solid.
+fn share_of_both(below: f32, free: f32, aligned: f32) -> f32 {
+    if free == 1.0 {
+        return below;
+    }
+    let product = below * free;
+    let extreme = if aligned > 0.0 { (below + free - 1.0).max(0.0) } else { below.min(free) };
+    product + aligned.abs() * (extreme - product)
+}
+
+/// The cosine of the angle between the slopes of two fields over a surface cell.
+fn cosine(a: &[f32; 8], b: &[f32; 8]) -> f32 {
+    let slope = |of: &[f32; 8]| -> Vec3 {
+        [0, 1, 2].map(|axis| (0..8).map(|k| if k >> axis & 1 == 1 { of[k] } else { -of[k] }).sum())
+    };
+    let [a, b] = [slope(a), slope(b)];
+    let lengths = length(a) * length(b);
+    if lengths > 0.0 { (dot(a, b) / lengths).clamp(-1.0, 1.0) } else { 0.0 }
+}
+
 /// φ in the middle of the 2³ parts of a surface cell, x fastest. `at`: where it is in `phi`; `steps`: how far from there those beside it
 /// are, along each axis.
 fn parts(phi: &[f32], at: usize, steps: [usize; 3]) -> [f32; 8] {
@@ -127,12 +177,12 @@ fn parts(phi: &[f32], at: usize, steps: [usize; 3]) -> [f32; 8] {
 mod tests {
     use std::f64::consts::PI;
 
-    use numerics::vector::length;
+    use numerics::vector::sub;
 
     use super::*;
     use crate::marked::MarkedSurface;
     use crate::rows::CellRows;
-    use crate::step::Wall;
+    use crate::step::{Solid, Wall};
 
     /// The sum of the shares of all cells of a ball of 4.3 cells radius, as it is and 0.1 cells larger.
     fn ball(domain: Domain, resolution: u32, middle: Vec3) -> [f64; 2] {
@@ -143,7 +193,7 @@ mod tests {
             })
         };
         let surface = MarkedSurface::new(domain, resolution, |p| length(home(p)) - 4.3, 0, 1);
-        let shares = Shares::of(&surface, &domain);
+        let shares = Shares::of(&surface, &domain, None);
         let mut share = shares.reader();
         CellRows::cuboid(domain.low, domain.high).iter().fold([0.0; 2], |sums, cell| {
             let (shares, _) = share(cell, [0.0, 0.1]);
@@ -168,12 +218,56 @@ mod tests {
         }
     }
 
+    /// Even films on a ball, a floor that cuts cells and a slope.
+    #[test]
+    fn films_on_solids_hold_their_volume() {
+        type Distance = fn(f64, Vec3) -> f32;
+        let domain = Domain::closed([0; 3], [24; 3]);
+        let ball: Distance = |_, p| length(sub(p, [12.1, 11.7, 12.3])) - 7.3;
+        let floor: Distance = |_, p| p[1] - 8.27;
+        let slope: Distance = |_, p| (p[1] - 0.3 * p[0] - 5.3) * 0.957_826;
+        let on_plane = |thickness: f64| 24.0 * 24.0 * thickness;
+        let on_ball = |thickness: f64| 4.0 / 3.0 * PI * ((7.3 + thickness).powi(3) - 7.3_f64.powi(3));
+        for (thickness, resolution) in [0.2_f32, 0.4, 0.7, 1.0, 1.5, 2.5].into_iter().flat_map(|t| [(t, 1), (t, 2)]) {
+            let exact = f64::from(thickness);
+            for (solid, volume) in
+                [(ball, on_ball(exact)), (floor, on_plane(exact)), (slope, on_plane(exact) / 0.957_826)]
+            {
+                let mut surface = MarkedSurface::new(domain, resolution, |p| solid(0.0, p) - thickness, 0, 1);
+                surface.meet(&|p| solid(0.0, p));
+                let still = Solid::still(&solid);
+                let shares = Shares::of(&surface, &domain, Some(still.at(0.0)));
+                let mut share = shares.reader();
+                let cells = CellRows::cuboid(domain.low, domain.high);
+                let sum: f64 = cells.iter().map(|cell| f64::from(share(cell, [0.0]).0[0])).sum();
+                let most = if thickness < 0.3 { 0.03 } else { 5e-3 };
+                assert!((sum / volume - 1.0).abs() < most, "{thickness}, {resolution}: {sum} {volume}");
+            }
+        }
+    }
+
+    /// A post through the surface of a pool.
+    #[test]
+    fn a_pool_around_a_post_holds_what_is_outside() {
+        let domain = Domain::closed([0; 3], [12; 3]);
+        let post = |_: f64, p: Vec3| (p[0] - 5.3).abs().max((p[2] - 6.2).abs()) - 2.15;
+        let mut surface = MarkedSurface::new(domain, 1, |p| p[1] - 5.4, 0, 1);
+        surface.meet(&|p| post(0.0, p));
+        let still = Solid::still(&post);
+        let shares = Shares::of(&surface, &domain, Some(still.at(0.0)));
+        let mut share = shares.reader();
+        let sum: f64 =
+            CellRows::cuboid(domain.low, domain.high).iter().map(|cell| f64::from(share(cell, [0.0]).0[0])).sum();
+        let volume = 5.4 * (144.0 - 4.3 * 4.3);
+        assert!((sum / volume - 1.0).abs() < 3e-3, "{sum} {volume}");
+    }
+
     /// Liquid that touches a wall goes on beyond it: cells next to it are full.
     #[test]
     fn a_pool_holds_its_depth() {
         let domain = Domain::closed([0; 3], [6, 8, 6]);
         let surface = MarkedSurface::new(domain, 1, |p| p[1] - 3.3, 0, 1);
-        let (shares, mut sum) = (Shares::of(&surface, &domain), 0.0);
+        let (shares, mut sum) = (Shares::of(&surface, &domain, None), 0.0);
         let mut share = shares.reader();
         for cell in CellRows::cuboid(domain.low, domain.high).dilated(2).iter() {
             sum += share(cell, [0.0]).0[0];

@@ -4,6 +4,7 @@ use numerics::vector::{Vec3, add, length, scale, sub};
 
 use crate::level_set::{Distance, Held, PhiChange, PhiView, far_from_surface, held};
 use crate::rows::{Cell, Periods};
+use crate::step::ViscousSolve;
 use crate::step::continuity::Swelling;
 use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
@@ -183,6 +184,7 @@ pub(super) fn substep(
     let [on_way, solid] = [middle, times[1]].map(|time| around.solid.map(|solid| solid.at(time)));
     let step = (seconds / settings.cell) as f32;
     let gravity = (around.gravity)(middle).map(|g| g * seconds);
+    let own = [(around.viscosity)(middle), settings.density];
     let start = Start { settings, surface, around, span, kept: kept.as_ref() };
     let mut before_end = start.begin(motion);
     let periods = settings.domain.periods();
@@ -197,7 +199,11 @@ pub(super) fn substep(
     let left_domain = outflow.iter().map(|outflow| outflow.volume).sum();
     motion.outflow.extend(outflow);
     motion.carry(&flow, surface.view(), settings);
-    let held = remainder::Held::of(velocity.rows(), surface, &settings.domain, reach);
+    let shapes: Vec<_> = around.shapes().collect();
+    let is_counted =
+        solid.is_some_and(|solid| solid.is_still()) && is_without_viscosity(settings, motion, own, seconds);
+    let others = Others { domain: &settings.domain, solid, is_counted, shapes: &shapes, time: middle };
+    let held = remainder::Held::of(velocity.rows(), surface, &others, reach);
     if let Some(swelling) = Swelling::of(&flow, &surface.view(), &settings.domain) {
         surface.swell(&swelling);
     }
@@ -205,8 +211,6 @@ pub(super) fn substep(
     if let Some(solid) = solid {
         surface.meet(&|point| solid.distance(point));
     }
-    let shapes: Vec<_> = around.shapes().collect();
-    let others = Others { domain: &settings.domain, solid, shapes: &shapes, time: middle };
     let mut remainder = Remainder::of(&flow, &held, &others, reach);
     // What moves farther ends anywhere, and a second look would add to that.
     let looks = if reach < FARTHEST { LOOKS } else { 1 };
@@ -238,7 +242,6 @@ pub(super) fn substep(
         moving.for_each(|(u, _)| *u += gravity[axis] as f32);
     }
 
-    let own = [(around.viscosity)(middle), settings.density];
     let materials = motion.materials_of(&cells, surface.view(), &settings.domain, own.map(|own| own as f32));
     let materials = Materials::new(own, materials, settings, seconds);
     let speed = motion.largest_speed().max(exchanged.speed(settings.cell));
@@ -270,6 +273,12 @@ pub(super) fn substep(
     // Faces with an imposed velocity count as closed in the cells.
     *kept = imposed.is_empty().then(|| Kept::new(cells, equations));
     report
+}
+
+/// Whether there is one liquid, whose viscosity and density are `own`, and that viscosity is left out.
+fn is_without_viscosity(settings: &LiquidSettings, motion: &Motion, own: [f64; 2], seconds: f64) -> bool {
+    let scaled = own[0] * seconds / (own[1] * settings.cell * settings.cell);
+    motion.materials.is_none() && settings.coupling.solve(scaled) == ViscousSolve::LeftOut
 }
 
 /// A velocity continued past the liquid.

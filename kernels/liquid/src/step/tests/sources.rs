@@ -343,10 +343,11 @@ fn sources_where_no_liquid_can_be_give_nothing() {
             let mut liquid = pool(9.3);
             for _ in 0..3 {
                 let report = liquid.step_frame(&around, FRAME);
-                assert_eq!((report.sourced, report.sunk), (0.0, 0.0));
+                // Differences of two sums.
+                assert!(report.sourced.abs() < 1e-9 && report.sunk.abs() < 1e-9, "{report:?}");
                 let withheld = if rate.is_some() { 0.1 * FRAME } else { 0.0 };
                 for account in [liquid.sources()[0], liquid.sinks()[0]] {
-                    assert!((account.withheld - withheld).abs() < 1e-12 && account.owed == 0.0, "{account:?}");
+                    assert!((account.withheld - withheld).abs() < 1e-9 && account.owed == 0.0, "{account:?}");
                 }
                 assert!(largest(&liquid) < 1e-3 && report.unbalanced == 0.0, "{report:?}");
             }
