@@ -191,7 +191,7 @@ metrics! { METRICS:
             cells and substeps are too coarse, before `volume_correction` made good {volume_made_good} % of the volume, {made_good_now} % in this \
             frame; 0 if it is off. With it, the volume as a whole is right, but some parts of the liquid are too thick and others too thin. \
             Films, drops, sheets and jets thinner than two cells enclose more or less than they hold, and liquid loses \
-            volume as it moves near sources, sinks, open walls and colliders, unless these are still and thick and its `viscosity` is 0: smaller \
+            volume as it moves near sources, sinks, open walls and colliders that move: smaller \
             cells, or `resolution` 2 with `cfl` 1, lose less.");
     MADE_GOOD = Metric::new("volume_made_good", Unit::Percent,
         "Volume that correction has added or removed since the start, in percent of the volume.");
@@ -288,7 +288,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "FluidSolve",
-    23,
+    24,
     "Simulates a liquid, from water to honey to nearly rigid. It falls, splashes, sloshes, piles up and creeps. `viscosity` has \
      the same effect at any cell size and time step.",
     Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),

@@ -5,7 +5,7 @@
 
 use numerics::vector::{Vec3, add, dot, length, scale, sub};
 
-use super::sides::{Sides, is_edge, may_be_thin, outward};
+use super::sides::{Sides, into, is_edge, may_be_thin, outward};
 use super::{Distance, PhiSampler, PhiView};
 
 /// Depth in a solid, in cells, to which liquid that touches it goes on.
@@ -37,9 +37,6 @@ const LAG: f32 = 0.25;
 /// Height above a thin solid up to which a cell may be next to one that goes on from the other side: half a cell, and half of
 /// what the ways out of both sides differ by where the middle of a cell counts as half-way.
 const NEXT_TO: f32 = 0.61;
-
-/// Depth below the surface of a solid, in cells, at which its sides are looked for.
-pub(crate) const INTO: f32 = 0.1;
 
 /// Distance from an edge of a solid within which a face of a cell inside may be open, ÷ the width of a face: half of it, the
 /// width over which a distance that is sampled at cells is rounded off, and some room.
@@ -97,9 +94,8 @@ impl<'a> Contact<'a> {
         if self.sampler.at(sub(at, normal)) >= 0.0 || !may_be_thin(self.solid, at, height, normal) {
             return own;
         }
-        let inside = sub(at, scale(normal, height + INTO));
-        let depth = -(self.solid)(inside);
-        let sides = Sides::of(self.solid, inside, depth).filter(|sides| depth > 0.0 && sides.is_thin());
+        let Some((inside, depth)) = into(self.solid, at, height, normal) else { return own };
+        let sides = Sides::of(self.solid, inside, depth).filter(Sides::is_thin);
         if sides.is_none_or(|sides| sides.are_at_rim(self.solid, inside, self.edge)) {
             return own;
         }

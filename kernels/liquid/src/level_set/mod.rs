@@ -22,12 +22,11 @@ use numerics::vector::{Vec3, add, length, scale, sub};
 use serde::{Deserialize, Serialize};
 
 pub use contact::CONTACT;
-pub(crate) use contact::INTO;
 pub use refine::refined;
 pub use sample::PhiSampler;
 pub(crate) use sample::floor;
 pub use sides::{Held, outward};
-pub(crate) use sides::{Sides, held};
+pub(crate) use sides::{Sides, held, into};
 pub use view::PhiView;
 pub(crate) use view::RowBlocks;
 

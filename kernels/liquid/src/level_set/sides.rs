@@ -196,6 +196,14 @@ pub(super) fn may_be_thin(solid: &Distance<'_>, at: Vec3, height: f32, normal: V
     solid(sub(at, scale(normal, height.max(0.0) + LOOK))) > -THICK
 }
 
+/// A place in a solid close to its surface, and how deep it is, below one `height` above it along `normal`.
+pub(crate) fn into(solid: &Distance<'_>, at: Vec3, height: f32, normal: Vec3) -> Option<(Vec3, f32)> {
+    INTO.into_iter()
+        .map(|further| sub(at, scale(normal, height + further)))
+        .map(|inside| (inside, -solid(inside)))
+        .find(|(_, depth)| *depth > 0.0)
+}
+
 /// How far it is to the side behind, straight or, where a thin solid ends at another, aslant, and the way there.
 fn behind(solid: &Distance<'_>, at: Vec3, depth: f32, normal: Vec3) -> (f32, Vec3) {
     let straight = scale(normal, -1.0);
@@ -231,6 +239,13 @@ fn way_out(solid: &Distance<'_>, at: Vec3, depth: f32, way: Vec3) -> f32 {
     f32::INFINITY
 }
 
+/// How much farther than a distance says, in cells, the surface of a solid may be: a distance that is sampled at cells falls
+/// more slowly towards a thin one.
+const INTO: [f32; 4] = [0.1, 0.2, 0.3, 0.5];
+
+/// Height above a side, in cells, from which a way is looked at that starts in a solid.
+const CLEAR: f32 = 0.01;
+
 /// A way that ends on a thin solid, where it slides along it.
 #[derive(Clone, Copy, Debug)]
 pub struct Held {
@@ -242,6 +257,18 @@ pub struct Held {
 
 /// What is left of a way from a place in cells where it would go into a thin solid; `None` where it does not.
 pub(crate) fn held(solid: &Distance<'_>, from: Vec3, way: Vec3) -> Option<Held> {
+    let mut held = held_by_side(solid, from, way)?;
+    // Along this side it may come to others, up to a corner of three.
+    let from = add(from, scale(held.normal, (CLEAR - solid(from)).max(0.0)));
+    for _ in 0..2 {
+        let Some(next) = held_by_side(solid, from, held.way) else { break };
+        held.way = next.way;
+    }
+    Some(held)
+}
+
+/// The same for the first side that it comes to.
+fn held_by_side(solid: &Distance<'_>, from: Vec3, way: Vec3) -> Option<Held> {
     let far = length(way);
     let (mut gone, mut height) = (0.0, solid(from));
     if height >= far {

@@ -1,8 +1,8 @@
 //! The box that a liquid is in.
 
-use numerics::vector::{Vec3, scale, sub};
+use numerics::vector::Vec3;
 
-use crate::level_set::{INTO, OpenSides, Sides, outward};
+use crate::level_set::{OpenSides, Sides, into, outward};
 use crate::open_share::open_share;
 use crate::rows::{Cell, CellRows, Periods};
 use crate::velocity::{FaceFields, Site};
@@ -98,9 +98,11 @@ impl Obstacle<'_> {
     pub(super) fn is_thin_at(&self, place: Vec3) -> bool {
         let solid = |point: Vec3| self.distance(point);
         let Some(normal) = self.normal(place) else { return false };
-        let inside = sub(place, scale(normal, (self.distance(place) + INTO).max(0.0)));
-        let depth = -self.distance(inside);
-        depth > 0.0 && Sides::of(&solid, inside, depth).is_some_and(|sides| sides.is_thin())
+        let inside = match self.distance(place) {
+            height if height < 0.0 => Some((place, -height)),
+            height => into(&solid, place, height, normal),
+        };
+        inside.and_then(|(inside, depth)| Sides::of(&solid, inside, depth)).is_some_and(|sides| sides.is_thin())
     }
 
     /// The unit vector out of it.

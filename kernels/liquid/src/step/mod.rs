@@ -43,6 +43,7 @@ mod motion;
 mod outflow;
 mod part;
 mod passed;
+mod pools;
 mod pour;
 mod project;
 mod remainder;

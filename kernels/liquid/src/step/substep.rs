@@ -2,9 +2,8 @@
 
 use numerics::vector::{Vec3, add, length, scale, sub};
 
-use crate::level_set::{Distance, Held, PhiChange, PhiView, far_from_surface, held};
-use crate::rows::{Cell, Periods};
-use crate::step::ViscousSolve;
+use crate::level_set::{Distance, Held, PhiChange, PhiView, far_from_surface, floor, held};
+use crate::rows::{Cell, CellRows, Periods};
 use crate::step::continuity::Swelling;
 use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
@@ -14,11 +13,12 @@ use crate::step::mean::{Kept, Start};
 use crate::step::motion::{Gain, LiquidCells, Motion, largest_of};
 use crate::step::outflow::outflow;
 use crate::step::passed::passed_over;
+use crate::step::pools::Pools;
 use crate::step::project::{Materials, Projection};
 use crate::step::remainder::{self, Others, Remainder};
 use crate::step::sources::{LiquidSink, LiquidSource, SourceShape, Span};
 use crate::step::turned;
-use crate::step::{LiquidReport, LiquidSettings, Splitting};
+use crate::step::{LiquidReport, LiquidSettings, Splitting, ViscousSolve};
 use crate::velocity::{Advection, Around, FaceFields, MacVelocity, Method, Sampler, Slopes};
 
 /// What is around a liquid.
@@ -200,14 +200,18 @@ pub(super) fn substep(
     motion.outflow.extend(outflow);
     motion.carry(&flow, surface.view(), settings);
     let shapes: Vec<_> = around.shapes().collect();
-    let is_counted =
-        solid.is_some_and(|solid| solid.is_still()) && is_without_viscosity(settings, motion, own, seconds);
-    let others = Others { domain: &settings.domain, solid, is_counted, shapes: &shapes, time: middle };
+    let still = solid.filter(Obstacle::is_still);
+    let is_thin = still.is_some_and(|solid| Pools::are_needed(&surface.view(), solid));
+    let is_counted = is_thin || still.is_some() && is_without_viscosity(settings, motion, own, seconds);
+    let others = Others { domain: &settings.domain, solid, is_counted, is_thin, shapes: &shapes, time: middle };
     let held = remainder::Held::of(velocity.rows(), surface, &others, reach);
     if let Some(swelling) = Swelling::of(&flow, &surface.view(), &settings.domain) {
         surface.swell(&swelling);
     }
     surface.advance(&flow, reach);
+    if let Some(cells) = held.come_through(&surface.view()) {
+        take_out(surface, &cells);
+    }
     if let Some(solid) = solid {
         surface.meet(&|point| solid.distance(point));
     }
@@ -279,6 +283,12 @@ pub(super) fn substep(
 fn is_without_viscosity(settings: &LiquidSettings, motion: &Motion, own: [f64; 2], seconds: f64) -> bool {
     let scaled = own[0] * seconds / (own[1] * settings.cell * settings.cell);
     motion.materials.is_none() && settings.coupling.solve(scaled) == ViscousSolve::LeftOut
+}
+
+/// Makes cells air.
+fn take_out(surface: &mut dyn Surface, cells: &CellRows) {
+    let Some((low, high)) = cells.bounds() else { return };
+    surface.change(low, high, &|place, phi| if cells.find(place.map(floor)).is_some() { phi.max(1.0) } else { phi });
 }
 
 /// A velocity continued past the liquid.

@@ -20,13 +20,22 @@ struct Scene {
     frames: u32,
 }
 
+/// What became of the liquid, ÷ its volume.
+#[derive(Debug)]
+struct Outcome {
+    /// What is on the other side at the end.
+    leaked: f64,
+    /// What correction did not restore, at most.
+    missing: f64,
+}
+
 impl Scene {
     fn in_box(size: Cell, triangles: Vec<[u32; 3]>, points: Vec<Vec3>) -> Self {
         Self { points, triangles, domain: Domain::closed([0; 3], size), cell: 0.04, viscosity: 0.001, frames: 20 }
     }
 
     /// The share of the liquid that is where `is_outside` says at the end, with pieces that were lost there.
-    fn leaked(&self, liquid: impl Fn(Vec3) -> f32 + Sync, is_outside: impl Fn(Vec3) -> bool) -> f64 {
+    fn run(&self, liquid: impl Fn(Vec3) -> f32 + Sync, is_outside: impl Fn(Vec3) -> bool) -> Outcome {
         let settings = ShapeSettings { thicken: true, ..ShapeSettings::new(self.domain.low, self.domain.high) };
         let topology = ShapeTopology::new(&self.points, &self.triangles);
         let shape = MovingShape::new(&topology, &self.points, &self.points, &settings);
@@ -39,16 +48,17 @@ impl Scene {
         let viscosity = |_| self.viscosity;
         let around = Surroundings { viscosity: &viscosity, solid: Some(Solid::still(&distance)), ..FALLING };
         let settings = LiquidSettings::new(self.domain, self.cell);
-        let (mut motion, mut lost) = (Motion::default(), 0.0);
+        let (mut motion, mut lost, mut missing) = (Motion::default(), 0.0, 0.0_f64);
         for _ in 0..self.frames {
             let mut liquid = Liquid::resume(settings.clone(), surface, motion);
             liquid.step_frame(&around, FRAME);
             (surface, motion) = liquid.into_parts();
             let report = targets.correct(&mut surface, Some(&solid));
+            missing = missing.max(-report.drift);
             lost +=
                 report.lost.iter().filter(|piece| is_outside(piece.place)).fold(0.0, |sum, piece| sum + piece.volume);
         }
-        (self.outside(&surface, &solid, &is_outside) + lost) / full
+        Outcome { leaked: (self.outside(&surface, &solid, &is_outside) + lost) / full, missing }
     }
 
     /// The volume, m³, where `is_outside` says.
@@ -122,26 +132,26 @@ fn plate(middle: Vec3, half: Vec3, turn: f32) -> (Vec<[u32; 3]>, Vec<Vec3>) {
     (shape.triangles(), shape.points.iter().map(|p| place(*p)).collect())
 }
 
-/// Where three sheets meet, a drop may come through, depending on where the corner is in its cell: of 120 positions, the worst
-/// lost 0.11 %, and all together 0.005 %.
+/// Of 120 positions, none leaks; where all sheets lie on faces of cells, at the first, the most is missing for a frame.
 #[test]
 fn an_open_box_of_sheets_holds_syrup() {
-    const POSITIONS: u8 = 12;
-    let mut sum = 0.0;
-    for n in (0..POSITIONS).map(f32::from) {
-        let shift = [0.137, 0.251, 0.319].map(|step| step * n % 1.0);
-        let [low, high] = [[3.0, 3.0, 3.0], [13.0, 11.0, 13.0]].map(|p: Vec3| numerics::vector::add(p, shift));
-        let (triangles, points) = open_box(low, high);
-        let scene = Scene { viscosity: 1.0, ..Scene::in_box([17, 16, 17], triangles, points) };
-        let liquid = block(low.map(|x| x + 2.0), high.map(|x| x - 2.0));
-        // Sheets are a cell thick to the liquid, and a surface on them shows in the cells beside.
-        let is_outside =
-            |p: Vec3| (0..3).any(|axis| p[axis] < low[axis] - 1.25 || axis != 1 && p[axis] > high[axis] + 1.25);
-        let leaked = scene.leaked(liquid, is_outside);
-        assert!(leaked < 2e-3, "{shift:?}: {leaked}");
-        sum += leaked;
+    for n in (0..12_u8).map(f32::from) {
+        let outcome = box_of_sheets([0.137, 0.251, 0.319].map(|step| step * n % 1.0));
+        let most = if n == 0.0 { 0.05 } else { 0.01 };
+        assert!(outcome.leaked < 1e-6 && outcome.missing < most, "{n}: {outcome:?}");
     }
-    assert!(sum / f64::from(POSITIONS) < 2e-4, "{sum}");
+}
+
+/// Syrup that falls into an open box of sheets.
+fn box_of_sheets(shift: Vec3) -> Outcome {
+    let [low, high] = [[3.0, 3.0, 3.0], [13.0, 11.0, 13.0]].map(|p: Vec3| numerics::vector::add(p, shift));
+    let (triangles, points) = open_box(low, high);
+    let scene = Scene { viscosity: 1.0, ..Scene::in_box([17, 16, 17], triangles, points) };
+    let liquid = block(low.map(|x| x + 2.0), high.map(|x| x - 2.0));
+    // Sheets are a cell thick to the liquid, and a surface on them shows in the cells beside.
+    let is_outside =
+        |p: Vec3| (0..3).any(|axis| p[axis] < low[axis] - 1.25 || axis != 1 && p[axis] > high[axis] + 1.25);
+    scene.run(liquid, is_outside)
 }
 
 #[test]
@@ -154,8 +164,8 @@ fn a_thin_bowl_holds_syrup() {
             let [x, y, z] = [(p[0] - 10.0) / 10.0, (p[1] - 11.0) / 8.0, (p[2] - 10.0) / 10.0];
             p[1] < 11.0 && length([x, y, z]) > 1.0
         };
-        let leaked = scene.leaked(disk, is_outside);
-        assert!(leaked < 1e-3, "{thickness}: {leaked}");
+        let outcome = scene.run(disk, is_outside);
+        assert!(outcome.leaked < 1e-3 && outcome.missing < 0.01, "{thickness}: {outcome:?}");
     }
 }
 
@@ -166,7 +176,7 @@ fn a_tilted_plate_holds_water() {
         let scene = Scene::in_box([24, 22, 10], triangles, points);
         let liquid = block([7.0, 13.0, -9.0], [17.0, 19.0, 19.0]);
         let is_outside = |p: Vec3| libm::cosf(turn) * (p[1] - 8.0) - libm::sinf(turn) * (p[0] - 12.0) < -1.5;
-        let leaked = scene.leaked(liquid, is_outside);
-        assert!(leaked < 1e-3, "{thickness} {turn}: {leaked}");
+        let outcome = scene.run(liquid, is_outside);
+        assert!(outcome.leaked < 1e-3 && outcome.missing < 0.03, "{thickness} {turn}: {outcome:?}");
     }
 }
