@@ -567,7 +567,7 @@ mod tests {
         for (name, solid) in [("post", &post as &(dyn Fn(Vec3) -> f32 + Sync)), ("ball", &ball), ("slope", &slope)] {
             for resolution in [1, 2] {
                 let drift = drift(resolution, 9.0, Some(solid));
-                assert!(drift < 0.03, "{name}, {resolution}: {drift}");
+                assert!(drift < 0.02, "{name}, {resolution}: {drift}");
             }
         }
     }

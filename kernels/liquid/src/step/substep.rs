@@ -210,7 +210,7 @@ pub(super) fn substep(
     }
     surface.advance(&flow, reach);
     if let Some(cells) = held.come_through(&surface.view()) {
-        take_out(surface, &cells);
+        make_air(surface, &cells);
     }
     if let Some(solid) = solid {
         surface.meet(&|point| solid.distance(point));
@@ -286,7 +286,7 @@ fn is_without_viscosity(settings: &LiquidSettings, motion: &Motion, own: [f64; 2
 }
 
 /// Makes cells air.
-fn take_out(surface: &mut dyn Surface, cells: &CellRows) {
+fn make_air(surface: &mut dyn Surface, cells: &CellRows) {
     let Some((low, high)) = cells.bounds() else { return };
     surface.change(low, high, &|place, phi| if cells.find(place.map(floor)).is_some() { phi.max(1.0) } else { phi });
 }
