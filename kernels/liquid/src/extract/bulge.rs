@@ -11,7 +11,7 @@ use super::smooth::Walls;
 use crate::level_set::PhiView;
 
 /// Cosine between the normals at the ends of an edge from which it spans a curve, and no kink.
-const SMOOTH: f32 = 0.2;
+const SMOOTH: f32 = 0.6;
 /// The farthest, in cells, that a vertex is moved: on a ball of one cell radius.
 const FARTHEST: f32 = 0.3;
 /// Quads that one thread looks at at a time.
