@@ -47,7 +47,7 @@ pub(super) fn extreme_sources_give_or_tell() {
             )
             .fastest(2000.0)
             .drift(1.0)
-            .noted(&["long_substeps", "volume_drift"]),
+            .noted(&["long_substeps", "cfl_reached"]),
             sourced(
                 "#49: a source in a sealed box that is full",
                 &rated("in_box"),
