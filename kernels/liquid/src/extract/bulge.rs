@@ -11,9 +11,9 @@ use super::smooth::Walls;
 use crate::level_set::PhiView;
 
 /// Cosine between the normals at the ends of an edge from which it spans a curve, and no kink.
-const SMOOTH: f32 = 0.6;
-/// The farthest, in cells, that a vertex is moved: on a ball of one cell radius.
-const FARTHEST: f32 = 0.3;
+const SMOOTH: f32 = 0.7;
+/// The farthest, in cells, that a vertex is moved: on a ball of 1.7 cells radius.
+const FARTHEST: f32 = 0.1;
 /// Quads that one thread looks at at a time.
 const CHUNK: usize = 4096;
 

@@ -3,7 +3,7 @@
 //! A cube between eight centres has one vertex for each loop in which the surface crosses its edges. A face whose two
 //! inside corners no edge connects is flipped where both of its cubes would pass it twice (Wenger 2013). A vertex lies at
 //! the mean of its crossings, moved onto tricubic φ by one step of Newton's method where its cube has no other, and then
-//! off it by as much as quads are chords of it. What is beyond a crease of φ, as in the middle of a film, does not count.
+//! off it by as much as quads are chords of it.
 //!
 //! Promise: for any φ the mesh is closed and manifold (each edge has two quads, each vertex one fan), quads wind
 //! counter-clockwise seen from outside, and the bits are the same on any number of threads. Along the ends of the domain

@@ -4,7 +4,7 @@ use numerics::vector::{Vec3, add, dot, scale, unit};
 
 use super::cubes::{Cube, Cubes};
 use super::table::{ends, table};
-use crate::level_set::cubic::{Block, cubic, without_creases};
+use crate::level_set::cubic::{Block, cubic};
 use crate::level_set::{PhiView, RowBlocks};
 
 /// Corner c of the cube in a [`Block`].
@@ -23,7 +23,7 @@ pub(super) fn vertices(view: PhiView<'_>, cubes: &Cubes, slab: usize, project: b
                 out.push((add(corner, [0.5; 3]), walls.outward()));
                 continue;
             }
-            let block = without_creases(blocks.at(cube.x));
+            let block = blocks.at(cube.x);
             let loops = table().loops[usize::from(cube.kind)];
             for edges in &loops.edges[..usize::from(loops.count)] {
                 let crossings = Crossings::of(cube, &block, *edges, walls);
@@ -118,8 +118,8 @@ impl Crossings {
     }
 }
 
-/// The farthest a vertex is moved, in cells: a longer step says that φ is too rough for its gradient to lead to its zero, and quads would
-/// cross each other on white noise.
+/// A longer step says that φ is too rough for its gradient to lead to its zero; taken all the same, quads cross each
+/// other on white noise.
 const LONGEST_STEP: f32 = 0.2;
 
 /// One step of Newton's method along the gradient, kept in the cube and on its walls.
@@ -132,11 +132,10 @@ fn newton(block: &Block, at: Vec3, Walls(walls): Walls) -> Vec3 {
         }
     }
     let square = dot(gradient, gradient);
-    // Not of values too large to interpolate, either.
-    if !(1e-4..f32::INFINITY).contains(&square) {
+    let step = value / square;
+    let tame = square > 1e-4 && step * step * square < LONGEST_STEP * LONGEST_STEP;
+    if !tame {
         return at;
     }
-    let longest = LONGEST_STEP / square.sqrt();
-    let step = (value / square).clamp(-longest, longest);
     std::array::from_fn(|axis| (at[axis] - step * gradient[axis]).clamp(0.0, 1.0))
 }

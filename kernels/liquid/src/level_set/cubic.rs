@@ -14,22 +14,6 @@ pub(crate) fn curved(bend: f32) -> f32 {
     bend * ((CREASED - bend.abs()) / (CREASED - CURVED)).clamp(0.0, 1.0)
 }
 
-/// φ of a block as it would go on from the inner two cells along each axis without a crease: what is beyond the middle of a film says
-/// nothing of this side of it, and would move its surface outward.
-#[inline(always)]
-pub(crate) fn without_creases(mut block: Block) -> Block {
-    let beyond = |end: f32, near: f32, next: f32| 2.0 * near - next + curved(end - 2.0 * near + next);
-    for (step, across) in [(1, [4, 16]), (4, [1, 16]), (16, [1, 4])] {
-        for line in 0..16 {
-            let first = line % 4 * across[0] + line / 4 * across[1];
-            let [a, b, c, d] = [0, 1, 2, 3].map(|n| block[first + n * step]);
-            block[first] = beyond(a, b, c);
-            block[first + 3 * step] = beyond(d, c, b);
-        }
-    }
-    block
-}
-
 /// Weights of four values, and of the derivative, at `t` between the second and the third.
 #[inline(always)]
 pub(crate) fn weights(t: f32) -> [[f32; 4]; 2] {

@@ -223,7 +223,7 @@ mod tests {
         }
     }
 
-    /// Even films on a ball, a floor that cuts cells and a slope; in cells, and as the mesh shows them.
+    /// Even films on a ball, a floor that cuts cells and a slope.
     #[test]
     fn films_on_solids_hold_their_volume() {
         type Distance = fn(f64, Vec3) -> f32;
@@ -247,31 +247,7 @@ mod tests {
                 let sum: f64 = cells.iter().map(|cell| f64::from(share(cell, [0.0]).0[0])).sum();
                 let most = if thickness < 0.3 { 0.03 } else { 5e-3 };
                 assert!((sum / volume - 1.0).abs() < most, "{thickness}, {resolution}: {sum} {volume}");
-                let mesh = surface.volume(domain.low, domain.high, Some(&|p| solid(0.0, p)));
-                assert!((mesh / volume - 1.0).abs() < 0.1, "{thickness}, {resolution}: {mesh} {volume}");
             }
-        }
-    }
-
-    /// Drops at 64 places in a cell: what cells hold and what the mesh encloses, ÷ their volume. The mesh without one-sided
-    /// interpolation and a bulge encloses 0.26, 0.52 and 0.78.
-    #[test]
-    fn small_drops_have_much_of_their_volume() {
-        let domain = Domain::closed([0; 3], [12; 3]);
-        for (radius, least) in [(1.0_f32, [0.6, 0.35]), (1.3, [0.9, 0.7]), (1.6, [0.98, 0.93]), (2.5, [0.99, 0.99])] {
-            let mut sums = [0.0; 2];
-            for n in 0..64 {
-                let middle = [n % 4, n / 4 % 4, n / 16].map(|n| 5.6 + 0.25 * n as f32);
-                let surface = MarkedSurface::new(domain, 1, |p| length(sub(p, middle)) - radius, 0, 1);
-                let shares = Shares::of(&surface, &domain, None);
-                let mut share = shares.reader();
-                let cells = CellRows::cuboid(domain.low, domain.high);
-                sums[0] += cells.iter().map(|cell| f64::from(share(cell, [0.0]).0[0])).sum::<f64>();
-                sums[1] += surface.volume(domain.low, domain.high, None);
-            }
-            let volume = 64.0 * ball_of(f64::from(radius));
-            let found = sums.map(|sum| sum / volume);
-            assert!((0..2).all(|n| found[n] > least[n] && found[n] < 1.01), "{radius}: {found:?}");
         }
     }
 

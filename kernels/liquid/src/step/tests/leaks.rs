@@ -132,13 +132,12 @@ fn plate(middle: Vec3, half: Vec3, turn: f32) -> (Vec<[u32; 3]>, Vec<Vec3>) {
     (shape.triangles(), shape.points.iter().map(|p| place(*p)).collect())
 }
 
-/// Of 120 positions, none leaks; where all sheets lie on faces of cells, at the first, the most is missing for a frame.
+/// At the first position all sheets lie on faces of cells.
 #[test]
 fn an_open_box_of_sheets_holds_syrup() {
     for n in (0..12_u8).map(f32::from) {
         let outcome = box_of_sheets([0.137, 0.251, 0.319].map(|step| step * n % 1.0));
-        let most = if n == 0.0 { 0.05 } else { 0.01 };
-        assert!(outcome.leaked < 1e-6 && outcome.missing < most, "{n}: {outcome:?}");
+        assert!(outcome.leaked < 1e-4 && outcome.missing < 0.01, "{n}: {outcome:?}");
     }
 }
 
