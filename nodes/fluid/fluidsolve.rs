@@ -191,7 +191,7 @@ metrics! { METRICS:
             cells and substeps are too coarse, before `volume_correction` made good {volume_made_good} % of the volume, {made_good_now} % in this \
             frame; 0 if it is off. With it, the volume as a whole is right, but some parts of the liquid are too thick and others too thin. \
             Films, drops, sheets and jets thinner than two cells enclose more or less than they hold, and liquid loses \
-            volume as it moves near sources, sinks, open walls and colliders that move: smaller \
+            volume as it moves near sources, sinks, open walls and colliders that move or that viscous liquid is on: smaller \
             cells, or `resolution` 2 with `cfl` 1, lose less.");
     MADE_GOOD = Metric::new("volume_made_good", Unit::Percent,
         "Volume that correction has added or removed since the start, in percent of the volume.");

@@ -17,8 +17,8 @@ const MOST: usize = 8;
 /// The volume of such a pool, in cells, at least. That of the largest may be less.
 const LEAST: f64 = 27.0;
 
-/// Layers of air around a pool that are its, counted face to face: these and, of those that it may come to, as many as lie across a
-/// cell's diagonal.
+/// Layers of air, counted face to face, that belong to a pool: these, and [`ACROSS`] for each cell that liquid moves, since a diagonal
+/// crosses that many.
 const AROUND: usize = 3;
 const ACROSS: f32 = 1.75;
 
@@ -27,7 +27,7 @@ const SOLID: u8 = u8::MAX - 1;
 
 /// Pools: liquid in cells that are connected face to face without a solid between, and the air around it.
 pub(super) struct Pools {
-    /// That of each cell, [`SOLID`] in solids and [`NONE`] where none may come to.
+    /// The pool of each cell; [`SOLID`] in solids, [`NONE`] where no liquid can arrive.
     of: Vec<u8>,
     count: usize,
 }
@@ -45,7 +45,7 @@ impl Pools {
         parts.contains(&true)
     }
 
-    /// Those of cells that hold these volumes. Nothing moves farther than `reach` cells.
+    /// The pools of cells that hold these volumes. Nothing moves farther than `reach` cells.
     pub(super) fn of(rows: &CellRows, volume: &[f32], domain: &Domain, solid: Obstacle<'_>, reach: f32) -> Self {
         let [is_free] = rows.tabulate_with(|| (), |(), cell, _| [solid.distance(Site::Centre.of(cell)) >= 0.0]);
         let cells: Vec<Cell> = rows.iter().collect();
@@ -97,12 +97,12 @@ impl Pools {
         Self { of, count }
     }
 
-    /// How many have an account of their own. What is in none of them has the number after these.
+    /// How many have an account of their own; smaller ones share the number after these.
     pub(super) fn count(&self) -> usize {
         self.count
     }
 
-    /// That of a cell, if it is one of a pool or beside it.
+    /// The pool that a cell is in or beside.
     pub(super) fn at(&self, at: usize) -> Option<usize> {
         (self.of[at] < SOLID).then_some(usize::from(self.of[at]))
     }

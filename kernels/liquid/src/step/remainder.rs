@@ -85,7 +85,7 @@ impl Held {
         [0, 1, 2].map(|axis| self.middle[axis][at])
     }
 
-    /// The cells that liquid of a surface has come to through a thin solid.
+    /// The cells that liquid has reached through a thin solid.
     pub(super) fn come_through(&self, view: &PhiView<'_>) -> Option<CellRows> {
         let pools = self.pools.as_ref()?;
         let cells = self
@@ -94,17 +94,17 @@ impl Held {
         (!cells.is_empty()).then_some(cells)
     }
 
-    /// How many accounts there are, the last of them for what is not in any pool.
+    /// How many accounts there are; with pools, the last one is for liquid that is in none of them.
     fn accounts(&self) -> usize {
         self.pools.as_ref().map_or(1, |pools| pools.count() + 1)
     }
 
-    /// That of what is in a cell.
+    /// The account of the liquid in a cell.
     fn account(&self, at: usize) -> usize {
         self.pools.as_ref().and_then(|pools| pools.at(at)).unwrap_or(0)
     }
 
-    /// That of what is in a cell now and was at a place before.
+    /// The account of liquid that is in a cell now and was at a place before.
     fn account_of(&self, finder: &Finder<'_>, domain: &Domain, at: usize, before: Vec3) -> usize {
         let Some(pools) = &self.pools else { return 0 };
         let there = finder.find(inner(domain, before.map(floor))).and_then(|at| pools.at(at));
