@@ -191,12 +191,12 @@ metrics! { METRICS:
             cells and substeps are too coarse, before `volume_correction` made good {volume_made_good} % of the volume, {made_good_now} % in this \
             frame; 0 if it is off. With it, the volume as a whole is right, but some parts of the liquid are too thick and others too thin. \
             Films, drops, sheets and jets thinner than two cells enclose more or less than they hold, and liquid loses \
-            volume as it moves near sources, sinks, open walls and colliders that move or that viscous liquid is on: smaller \
-            cells, or `resolution` 2 with `cfl` 1, lose less.");
+            volume as it moves near sources, sinks and open walls, and where colliders move by more than two cells in a substep: \
+            smaller cells, or `resolution` 2 with `cfl` 1, lose less.");
     MADE_GOOD = Metric::new("volume_made_good", Unit::Percent,
-        "Volume that correction has added or removed since the start, in percent of the volume.");
+        "Volume that correction has added to what cells hold, or removed, since the start, in percent of the volume.");
     MADE_GOOD_NOW = Metric::new("made_good_now", Unit::Percent,
-        "Volume that correction added or removed in the frame, in percent of the volume.");
+        "Volume that correction added to what cells hold, or removed, in the frame, in percent of the volume.");
     VOLUME_DRIFT = Metric::new("volume_drift", Unit::None, "Relative error of the volume that remains after correction.")
         .warn_outside(-0.01, 0.01, "The volume of the liquid is off by more than a hundredth at these frames: there are {volume} m³ of liquid and \
             {spray} of spray after {sourced} came from sources, {sunk} sank and {left_domain} left. With `volume_correction` the surface \
@@ -288,7 +288,7 @@ metrics! { METRICS:
 
 pub(crate) static NODE: Node = Node::new(
     "FluidSolve",
-    24,
+    25,
     "Simulates a liquid, from water to honey to nearly rigid. It falls, splashes, sloshes, piles up and creeps. `viscosity` has \
      the same effect at any cell size and time step.",
     Cook::solver::<Run>(|params| Some(params.get(START_FRAME))),

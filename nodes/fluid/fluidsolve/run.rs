@@ -286,7 +286,7 @@ impl Run {
         let in_cells = |volume: f64| (volume / (lattice.cell * lattice.cell * lattice.cell)) as f32;
         let mut owed = std::mem::take(&mut self.owed);
         owed.extend(landed.iter().map(|drop| (drop.place, in_cells(drop.volume))));
-        liquid.give(&owed);
+        liquid.give(&owed, &around, seconds);
         (self.surface, self.motion) = liquid.into_parts();
         for drop in landed {
             self.targets.add_phase(drop.volume, drop.phase, Some(drop.place));
@@ -325,6 +325,7 @@ impl Run {
         self.metrics.set(MADE_GOOD_NOW, percent(corrected.corrected_now, corrected.target));
         self.spray(&corrected.lost, air);
         self.owed.extend(&corrected.owed);
+        let raw_drift = corrected.raw_drift;
         let now = self.gather(settings, air).unwrap_or(corrected);
         if report.caps_hit > 0 {
             // In substeps too long to follow the liquid, no region knew what it had lost.
@@ -332,7 +333,7 @@ impl Run {
         }
         let waiting = self.targets.take_waiting();
         self.spray(&waiting, air);
-        self.metrics.set(VOLUME_DRIFT_RAW, now.raw_drift);
+        self.metrics.set(VOLUME_DRIFT_RAW, raw_drift);
         self.metrics.set(VOLUME_DRIFT, now.drift);
         self.metrics.set(MATERIAL_DRIFT, now.phase_drift);
     }

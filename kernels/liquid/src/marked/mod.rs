@@ -15,7 +15,7 @@ use crate::extract::{Placement, QuadMesh, extract_with};
 use crate::level_set::{BAND, Distance, Flow, Held, LevelSet, PhiChange, PhiView, Sides};
 use crate::markers::{FARTHEST, Marker, Markers};
 use crate::rows::{Cell, CellRows, Periods};
-use crate::step::{Domain, Moving, Owed, Shares, Surface, Swelling, Wall};
+use crate::step::{Domain, Moving, Owed, Shares, Solid, Surface, Swelling, WHOLE, Wall};
 
 /// Images beyond a periodic side, besides those that move in, so that φ in the band is that of a surface without an end.
 const IMAGES: i32 = 8;
@@ -162,26 +162,44 @@ impl MarkedSurface {
         self.restrict();
     }
 
-    /// Takes out surface cells, whole pieces of the liquid, and their markers. Returns what the solver's cells no longer hold.
-    pub(crate) fn take_out(&mut self, cells: &CellRows, is_taken: impl Fn(u32) -> bool) -> Vec<Owed> {
+    /// Takes out surface cells, whole pieces of the liquid, and their markers. Returns what the solver's cells no longer hold outside
+    /// the solid.
+    pub(crate) fn take_out(
+        &mut self,
+        cells: &CellRows,
+        solid: Option<&Distance<'_>>,
+        is_taken: impl Fn(u32) -> bool,
+    ) -> Vec<Owed> {
         let domain = self.domain();
         let around = coarsened(&cells.dilated(BAND as i32 + 1), self.resolution);
         let around = domain.periods().gathered(around).clipped(domain.low, domain.high);
-        let before = self.shares(&around);
+        let before = self.shares(&around, solid);
         let pieces = self.markers.pieces().to_vec();
         self.markers.retain(|n| !is_taken(pieces[n]));
         let cells = self.periods.with_images(cells.clone(), IMAGES);
         self.among_images(0.0, |_, set| set.take_out(&cells));
         self.restrict();
-        let taken = before.iter().zip(self.shares(&around)).map(|(before, now)| before - now);
+        let taken = before.iter().zip(self.shares(&around, solid)).map(|(before, now)| before - now);
         let of_cells = around.iter().zip(taken).filter(|(_, taken)| *taken != 0.0);
         of_cells.map(|(cell, taken)| (cell.map(|x| x as f32 + 0.5), taken)).collect()
     }
 
-    /// How much of each of some solver cells is liquid.
-    pub(crate) fn shares(&self, cells: &CellRows) -> Vec<f32> {
+    /// How much liquid all solver cells hold outside the solid, ÷ the volume of one.
+    pub(crate) fn held(&self, solid: Option<&Distance<'_>>) -> f64 {
+        let (view, domain) = (self.view(), self.domain());
+        let is_full = |phi: f32| phi < -WHOLE && solid.is_none();
+        let full =
+            view.rows.iter().zip(view.phi).filter(|(cell, phi)| is_full(**phi) && domain.contains(*cell)).count();
+        let others = view.rows.filtered(|_, at| view.phi[at] < WHOLE && !is_full(view.phi[at]));
+        self.shares(&others, solid).iter().fold(full as f64, |sum, share| sum + f64::from(*share))
+    }
+
+    /// How much of each of some solver cells is liquid outside the solid.
+    pub(crate) fn shares(&self, cells: &CellRows, solid: Option<&Distance<'_>>) -> Vec<f32> {
         let domain = self.domain();
-        let shares = Shares::of(self, &domain, None);
+        let distance = |_: f64, place: Vec3| solid.map_or(f32::INFINITY, |solid| solid(place));
+        let still = Solid::still(&distance);
+        let shares = Shares::of(self, &domain, solid.map(|_| still.at(0.0)));
         let [shares] = cells.tabulate_with(|| shares.reader(), |share, cell, _| share(cell, [0.0]).0);
         shares
     }

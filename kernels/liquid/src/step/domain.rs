@@ -59,7 +59,7 @@ impl<'a> Solid<'a> {
     }
 
     /// The solid at one time.
-    pub(super) fn at(self, time: f64) -> Obstacle<'a> {
+    pub(crate) fn at(self, time: f64) -> Obstacle<'a> {
         Obstacle { solid: self, time }
     }
 }
@@ -88,10 +88,6 @@ impl Obstacle<'_> {
     /// How fast it moves, at most, m/s.
     pub(super) fn speed(&self) -> f32 {
         self.solid.speed as f32
-    }
-
-    pub(super) fn is_still(&self) -> bool {
-        self.solid.speed == 0.0
     }
 
     /// Whether liquid on the other side of it could reach a place.

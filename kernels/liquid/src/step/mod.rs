@@ -61,14 +61,16 @@ pub use continuity::Swelling;
 pub use domain::{Domain, Solid, Wall};
 pub use motion::Motion;
 pub use outflow::Outflow;
-pub(crate) use remainder::SIZE as REGION;
-pub(crate) use shares::Shares;
+pub(crate) use shares::{Shares, WHOLE};
 pub use sources::{AttributeEdit, FlowAccount, LiquidSink, LiquidSource, SourceShape};
 pub use substep::{Moving, Owed, Surface, Surroundings};
 
 use self::exchange::Exchange;
 use self::mean::Kept;
+use self::pools::Pools;
+use self::remainder::{Held, Others, Remainder};
 use self::sources::Span;
+use self::substep::LOOKS;
 use crate::carried::{LiquidMaterial, MaterialPoints, TracerPoints};
 use crate::rows::CellRows;
 use crate::velocity::{MacVelocity, Scheme};
@@ -328,12 +330,26 @@ impl<S: Surface> Liquid<S> {
         self.motion.materials = Some(MaterialPoints::filling(&self.surface.view(), material));
     }
 
-    /// Moves the surface outward so that it gains these volumes, each in the part of the liquid where it is.
-    pub fn give(&mut self, owed: &[Owed]) {
-        let rows = self.surface.view().rows.clone();
-        if let Some(swelling) = remainder::given(&rows, &self.surface, &self.settings.domain, owed) {
-            self.surface.swell(&swelling);
+    /// Moves the surface outward so that it gains these volumes, each in the part of the liquid where it is. `seconds`: when, since the
+    /// start of the frame.
+    pub fn give(&mut self, owed: &[Owed], around: &Surroundings<'_>, seconds: f64) {
+        if owed.is_empty() || self.surface.view().rows.is_empty() {
+            return;
         }
+        let solid = around.solid.map(|solid| solid.at(seconds));
+        let view = self.surface.view();
+        let others = Others {
+            domain: &self.settings.domain,
+            solids: solid.map(|solid| [solid; 2]),
+            is_counted: true,
+            is_thin: solid.is_some_and(|solid| Pools::are_needed(&view, solid)),
+            shapes: &[],
+            time: seconds,
+        };
+        let held = Held::of(&view.rows.clone(), &self.surface, &others, 0.0);
+        let mut remainder = Remainder::of(None, &held, &others, 0.0);
+        remainder.owe(owed);
+        remainder.give_back(&mut self.surface, LOOKS);
     }
 
     /// The surface, and all else that the next frame depends on.

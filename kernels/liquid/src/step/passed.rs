@@ -24,6 +24,11 @@ const LAYERS: i32 = 4;
 const STRIDE: f32 = 0.5;
 const MOST_STEPS: f32 = 256.0;
 
+/// Whether a solid moves too far in a substep for the liquid before it to be pushed.
+pub(super) fn is_passing(flow: &Moving<'_>) -> bool {
+    flow.solid_way() > SEEN
+}
+
 /// The volume, ÷ cell³, of what is liquid at the end of a substep between `times` and whose way there went through a solid. The
 /// solid is where it is at each of several times on the way, whatever the surface made of it.
 pub(super) fn passed_over(
@@ -33,10 +38,10 @@ pub(super) fn passed_over(
     flow: &Moving<'_>,
     (solid, times): (Solid<'_>, [f64; 2]),
 ) -> f64 {
-    let solid_way = flow.solid_way();
-    if solid_way <= SEEN {
+    if !is_passing(flow) {
         return 0.0;
     }
+    let solid_way = flow.solid_way();
     // Where the solid is in the substep's middle, the flow that moves the surface is the solid's own.
     let velocity = motion.velocity_past_liquid(domain, LAYERS);
     let flow = Moving { velocity: &velocity, ..*flow };

@@ -1,16 +1,16 @@
 //! How much of cells is liquid.
 
-use numerics::vector::{Vec3, add, dot, length, scale};
+use numerics::vector::{Vec3, add, dot, length};
 
 use crate::level_set::PhiView;
 use crate::level_set::cubic::curved;
 use crate::rows::{Cell, Finder};
 use crate::step::Surface;
 use crate::step::domain::{Domain, Obstacle};
-use crate::velocity::{Site, trilinear};
+use crate::velocity::Site;
 
 /// |φ| of a cell, in cells, from which on it is all liquid or all air.
-pub(super) const WHOLE: f32 = 1.0;
+pub(crate) const WHOLE: f32 = 1.0;
 
 /// How far from the middle of a surface cell, in surface cells along each axis, the 2³ places are where it is looked at.
 const ASIDE: f32 = 0.25;
@@ -48,7 +48,7 @@ impl<'a> Shares<'a> {
     /// cells: by φ in the middle of 2³ parts of each surface cell. Fast where successive cells are near each other.
     pub(crate) fn reader<const N: usize>(&self) -> impl FnMut(Cell, [f32; N]) -> ([f32; N], Vec3) {
         let (coarse, around) = (Finder::new(self.view.rows), self.around());
-        let mut near = Vec::new();
+        let (mut near, mut heights) = (Vec::new(), Vec::new());
         let (fine, size) = (self.fine as usize, self.fine as usize + 2);
         let unit = fine as f32;
         move |cell, outward| {
@@ -64,17 +64,18 @@ impl<'a> Shares<'a> {
             }
             around(cell, &mut near);
             let solid = self.solid.filter(|_| height < CUT);
+            if let Some(solid) = solid {
+                self.heights(solid, cell, &mut heights);
+            }
             let (mut sums, mut moment) = ([0.0; N], [0.0; 3]);
             for n in 0..fine * fine * fine {
                 let own = [n % fine, n / fine % fine, n / fine / fine];
                 let [x, y, z] = own.map(|along| along + 1);
-                let (phi, places) = (parts(&near, x + size * (y + size * z), [1, size, size * size]), places(own));
-                let covered = solid.map(|solid| places.map(|place| self.height(solid, cell, place)));
-                let aligned = covered.map_or(0.0, |height| cosine(slope(&phi), slope(&height)));
-                let covered = covered.map(|height| {
-                    let steepness = length(slope(&height)).clamp(LEAST_STEEP, 1.0);
-                    height.map(|height| share_below(height / steepness))
-                });
+                let (at, steps) = (x + size * (y + size * z), [1, size, size * size]);
+                let (phi, places) = (parts(&near, at, steps), places(own));
+                let covered = solid.map(|_| covered(&heights, at, steps));
+                let aligned = covered.map_or(0.0, |(_, out)| cosine(slope(&phi), out));
+                let covered = covered.map(|(shares, _)| shares);
                 for (k, place) in places.into_iter().enumerate() {
                     let free = covered.map_or(1.0, |covered| 1.0 - covered[k]);
                     let shares =
@@ -89,10 +90,15 @@ impl<'a> Shares<'a> {
         }
     }
 
-    /// The height of a place in surface cells of a cell above a solid, in surface cells.
-    fn height(&self, solid: Obstacle<'_>, cell: Cell, place: Vec3) -> f32 {
-        let fine = self.fine as f32;
-        fine * solid.distance(add(cell.map(|x| x as f32), scale(place, 1.0 / fine)))
+    /// The heights of the surface cells of a cell and those around above a solid, in surface cells, x fastest.
+    fn heights(&self, solid: Obstacle<'_>, cell: Cell, heights: &mut Vec<f32>) {
+        let (fine, size) = (self.fine as f32, self.fine as usize + 2);
+        heights.clear();
+        heights.extend((0..size * size * size).map(|n| {
+            let own = [n % size, n / size % size, n / size / size];
+            let place = [0, 1, 2].map(|axis| cell[axis] as f32 + (own[axis] as f32 - 0.5) / fine);
+            fine * solid.distance(place)
+        }));
     }
 
     /// φ of the surface cells of a cell and those around, x fastest.
@@ -166,12 +172,54 @@ fn parts(phi: &[f32], at: usize, steps: [usize; 3]) -> [f32; 8] {
     // changes over half a cell along φ makes curved liquid larger by 1/96 φ″. Neither is true of a crease.
     let bend: f32 = steps.iter().map(|step| phi[at - step] + phi[at + step] - 2.0 * phi[at]).map(curved).sum();
     let too_high = bend / 12.0;
-    std::array::from_fn(|part| {
-        let beside = |at: usize, axis: usize| if part >> axis & 1 == 1 { at + steps[axis] } else { at - steps[axis] };
-        let corners =
-            std::array::from_fn(|k| (0..3).fold(at, |at, axis| if k >> axis & 1 == 1 { beside(at, axis) } else { at }));
-        trilinear(corners.map(|corner: usize| phi[corner]), [ASIDE; 3]) - too_high
+    // Along y, along z, along x.
+    let aside = |[below, own, above]: [f32; 3]| [own + (below - own) * ASIDE, own + (above - own) * ASIDE];
+    let [x, y, z] = steps;
+    let first = at - x - y - z;
+    let phi = &phi[first..=at + x + y + z];
+    let rows: [[[f32; 2]; 3]; 3] = std::array::from_fn(|k| {
+        std::array::from_fn(|i| {
+            let low = k * z + i * x;
+            aside([phi[low], phi[low + y], phi[low + 2 * y]])
+        })
+    });
+    let lines: [[[f32; 2]; 2]; 3] =
+        std::array::from_fn(|i| [0, 1].map(|j| aside([rows[0][i][j], rows[1][i][j], rows[2][i][j]])));
+    let ends: [[[f32; 2]; 2]; 2] =
+        std::array::from_fn(|j| [0, 1].map(|k| aside([lines[0][j][k], lines[1][j][k], lines[2][j][k]])));
+    std::array::from_fn(|part| ends[part >> 1 & 1][part >> 2][part & 1] - too_high)
+}
+
+/// The surface cells around a part of one, which comes first; then those beside it, x fastest.
+fn corners(at: usize, steps: [usize; 3], part: usize) -> [usize; 8] {
+    let beside = |at: usize, axis: usize| if part >> axis & 1 == 1 { at + steps[axis] } else { at - steps[axis] };
+    std::array::from_fn(|k| (0..3).fold(at, |at, axis| if k >> axis & 1 == 1 { beside(at, axis) } else { at }))
+}
+
+/// How much a field with these values at the [`corners`] of a part rises there towards them, over a surface cell.
+fn rise(corners: &[f32; 8]) -> Vec3 {
+    let weight = |k: usize, axis: usize| if k >> axis & 1 == 1 { ASIDE } else { 1.0 - ASIDE };
+    [0, 1, 2].map(|axis| {
+        (0..8).fold(0.0, |sum, k| {
+            let along = if k >> axis & 1 == 1 { 1.0 } else { -1.0 };
+            let across: f32 = (0..3).filter(|other| *other != axis).map(|other| weight(k, other)).product();
+            sum + along * across * corners[k]
+        })
     })
+}
+
+/// The shares of the 2³ parts of a surface cell that a solid covers, x fastest, and the way out of it. `heights`: those above it, as φ
+/// of [`parts`].
+fn covered(heights: &[f32], at: usize, steps: [usize; 3]) -> ([f32; 8], Vec3) {
+    let (mut out, own) = ([0.0; 3], parts(heights, at, steps));
+    let shares = std::array::from_fn(|part| {
+        let rise = rise(&corners(at, steps, part).map(|corner| heights[corner]));
+        for axis in 0..3 {
+            out[axis] += if part >> axis & 1 == 1 { rise[axis] } else { -rise[axis] };
+        }
+        share_below(own[part] / length(rise).clamp(LEAST_STEEP, 1.0))
+    });
+    (shares, out)
 }
 
 #[cfg(test)]

@@ -12,13 +12,13 @@ use crate::step::force::cut_cells;
 use crate::step::mean::{Kept, Start};
 use crate::step::motion::{Gain, LiquidCells, Motion, largest_of};
 use crate::step::outflow::outflow;
-use crate::step::passed::passed_over;
+use crate::step::passed::{is_passing, passed_over};
 use crate::step::pools::Pools;
 use crate::step::project::{Materials, Projection};
 use crate::step::remainder::{self, Others, Remainder};
 use crate::step::sources::{LiquidSink, LiquidSource, SourceShape, Span};
 use crate::step::turned;
-use crate::step::{LiquidReport, LiquidSettings, Splitting, ViscousSolve};
+use crate::step::{LiquidReport, LiquidSettings, Splitting};
 use crate::velocity::{Advection, Around, FaceFields, MacVelocity, Method, Sampler, Slopes};
 
 /// What is around a liquid.
@@ -155,7 +155,7 @@ pub(super) const SLOPING_LAYERS: u32 = 2;
 pub(super) const FARTHEST: f32 = 64.0;
 
 /// Times in a substep, at most, that a surface gets back what it did not keep.
-const LOOKS: u32 = 2;
+pub(super) const LOOKS: u32 = 4;
 
 /// Cells past the liquid whose velocity is needed where nothing moves farther than `reach` cells: a surface follows the flow
 /// as far as it may come.
@@ -200,10 +200,10 @@ pub(super) fn substep(
     motion.outflow.extend(outflow);
     motion.carry(&flow, surface.view(), settings);
     let shapes: Vec<_> = around.shapes().collect();
-    let still = solid.filter(Obstacle::is_still);
-    let is_thin = still.is_some_and(|solid| Pools::are_needed(&surface.view(), solid));
-    let is_counted = is_thin || still.is_some() && is_without_viscosity(settings, motion, own, seconds);
-    let others = Others { domain: &settings.domain, solid, is_counted, is_thin, shapes: &shapes, time: middle };
+    let solids = around.solid.map(|solid| times.map(|time| solid.at(time)));
+    let is_thin = solids.is_some_and(|[before, _]| Pools::are_needed(&surface.view(), before));
+    let is_counted = !is_passing(&flow);
+    let others = Others { domain: &settings.domain, solids, is_counted, is_thin, shapes: &shapes, time: middle };
     let held = remainder::Held::of(velocity.rows(), surface, &others, reach);
     if let Some(swelling) = Swelling::of(&flow, &surface.view(), &settings.domain) {
         surface.swell(&swelling);
@@ -215,14 +215,9 @@ pub(super) fn substep(
     if let Some(solid) = solid {
         surface.meet(&|point| solid.distance(point));
     }
-    let mut remainder = Remainder::of(&flow, &held, &others, reach);
     // What moves farther ends anywhere, and a second look would add to that.
     let looks = if reach < FARTHEST { LOOKS } else { 1 };
-    for _ in 0..looks {
-        if let Some(swelling) = remainder.swelling(surface) {
-            surface.swell(&swelling);
-        }
-    }
+    Remainder::of(Some(&flow), &held, &others, reach).give_back(surface, looks);
     let passed =
         around.solid.map_or(0.0, |solid| passed_over(&surface.view(), motion, &settings.domain, &flow, (solid, times)));
     let mut exchanged = Exchange { settings, around, solid, span }.apply(surface, motion);
@@ -277,12 +272,6 @@ pub(super) fn substep(
     // Faces with an imposed velocity count as closed in the cells.
     *kept = imposed.is_empty().then(|| Kept::new(cells, equations));
     report
-}
-
-/// Whether there is one liquid, whose viscosity and density are `own`, and that viscosity is left out.
-fn is_without_viscosity(settings: &LiquidSettings, motion: &Motion, own: [f64; 2], seconds: f64) -> bool {
-    let scaled = own[0] * seconds / (own[1] * settings.cell * settings.cell);
-    motion.materials.is_none() && settings.coupling.solve(scaled) == ViscousSolve::LeftOut
 }
 
 /// Makes cells air.

@@ -32,7 +32,7 @@ use crate::carried::{MaterialPoints, PhaseShares};
 use crate::level_set::{Distance, floor};
 use crate::marked::MarkedSurface;
 use crate::rows::CellRows;
-use crate::step::{Owed, REGION, Surface};
+use crate::step::{Owed, Surface};
 use follow::marked;
 use phases::{Ways, ways_of_phases};
 use pieces::{Measured, PieceCells, Pieces};
@@ -135,9 +135,10 @@ pub struct VolumeReport {
     pub target: f64,
     /// Error of the volume ÷ target.
     pub drift: f64,
-    /// What the drift would be if no surface had ever been moved here.
+    /// What the drift would be if no surface had ever been moved here: before it was now, and without `corrected` of before.
     pub raw_drift: f64,
-    /// What moving surfaces has added since the start, m³.
+    /// What moving surfaces has added to what the solver's cells hold since the start, m³. The mesh may change more, where it shows
+    /// more or less than cells hold, and later returns by itself.
     pub corrected: f64,
     /// What it added now, m³.
     pub corrected_now: f64,
@@ -267,8 +268,8 @@ impl VolumeTargets {
         let phases = known.as_ref();
         let (unit, size) = (self.unit(surface), f64::from(surface.resolution()));
         let (mut found, mut lost) = self.follow(surface, solid, phases);
-        let mut owed = self.given_twice(&lost, solid);
-        let before = self.corrected;
+        let mut owed = self.given_twice(&lost);
+        let (before, mut held, mut meshed) = (self.corrected, None, 0.0);
         let (mut cap, mut moved) = (0.5 * (most * size).min(OWN_CAP), 0.0);
         let mut responses = vec![1.0; found.all.len()];
         let mut error = f64::INFINITY;
@@ -282,14 +283,19 @@ impl VolumeTargets {
             if farthest == 0.0 {
                 break;
             }
+            held.get_or_insert_with(|| surface.held(solid));
             found.shift(surface, &ways, phases);
             let (now, vanished) = self.follow(surface, solid, phases);
-            self.corrected += unit * (now.volume() - found.volume());
             responses = now.responses(&found, &found.swept(&ways), &responses);
             // What vanished by a shift was not lost by the solver.
-            self.corrected += vanished.iter().fold(0.0, |sum, piece| sum + piece.volume);
+            let kept = vanished.iter().fold(0.0, |sum, piece| sum + piece.volume);
+            meshed += unit * (now.volume() - found.volume()) + kept;
+            self.corrected += kept;
             lost.extend(vanished);
             (found, cap, moved) = (now, 0.5 * cap, moved + farthest / size);
+        }
+        if let Some(held) = held {
+            self.corrected += (surface.held(solid) - held) * self.cell * self.cell * self.cell;
         }
         if let Some(materials) = materials
             && self.exchange(&found, surface, materials)
@@ -300,7 +306,9 @@ impl VolumeTargets {
         }
         self.drop_small(&mut found, surface, solid, (&mut lost, &mut owed));
         let report = self.report(&found, unit, moved, (lost, owed));
-        VolumeReport { corrected_now: self.corrected - before, ..report }
+        let corrected_now = self.corrected - before;
+        let raw_drift = report.drift - share(meshed + before, report.target);
+        VolumeReport { corrected_now, raw_drift, ..report }
     }
 
     /// Exchanges what phases of a piece lack and others have too much of; whether any was.
@@ -355,16 +363,15 @@ impl VolumeTargets {
         phases: Option<&PhaseShares>,
     ) -> VolumeReport {
         let (mut found, mut lost) = self.follow(surface, solid, phases);
-        let mut owed = self.given_twice(&lost, solid);
+        let mut owed = self.given_twice(&lost);
         self.drop_small(&mut found, surface, solid, (&mut lost, &mut owed));
         self.report(&found, self.unit(surface), 0.0, (lost, owed))
     }
 
-    /// What the liquid around has too much of after pieces vanished as they moved: unless a solid is near, it was given their volume
-    /// as liquid that the surface did not keep, and they are now spray, too.
-    fn given_twice(&self, lost: &[LostPiece], solid: Option<&Distance<'_>>) -> Vec<Owed> {
-        let is_clear = |piece: &&LostPiece| solid.is_none_or(|solid| solid(piece.place) > REGION as f32);
-        lost.iter().filter(is_clear).map(|piece| (piece.place, self.in_cells(-piece.volume))).collect()
+    /// What the liquid around has too much of after pieces vanished as they moved: it was given their volume as liquid that the surface
+    /// did not keep, and they are now spray, too.
+    fn given_twice(&self, lost: &[LostPiece]) -> Vec<Owed> {
+        lost.iter().map(|piece| (piece.place, self.in_cells(-piece.volume))).collect()
     }
 
     /// Takes the pieces out of a surface that are too small for its cells, and adds them to those lost.
@@ -402,12 +409,11 @@ impl VolumeTargets {
         let volume = unit * found.volume();
         let target = self.target();
         let errors = self.pieces.iter().map(|piece| piece.measured - piece.volume());
-        let share = |error: f64| if target > 0.0 { error / target } else { 0.0 };
         VolumeReport {
             volume,
             target,
-            drift: share(volume - target),
-            raw_drift: share(volume - self.corrected - target),
+            drift: share(volume - target, target),
+            raw_drift: share(volume - self.corrected - target, target),
             corrected: self.corrected,
             corrected_now: 0.0,
             pieces: found.all.iter().filter(|piece| piece.volume > 0.0).count(),
@@ -480,6 +486,11 @@ impl VolumeTargets {
 /// The farthest that a surface is to be moved after a frame in which the fastest liquid moved `way` solver cells.
 pub fn cap(way: f64) -> f64 {
     (OF_WAY * way).clamp(CAP, FARTHEST)
+}
+
+/// A volume ÷ the target; 0 where that is nothing.
+fn share(volume: f64, target: f64) -> f64 {
+    if target > 0.0 { volume / target } else { 0.0 }
 }
 
 /// The volume of each piece, m³, where all its parts are in no other and have one.

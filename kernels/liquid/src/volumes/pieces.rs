@@ -271,7 +271,7 @@ impl Pieces {
             return (taken, Vec::new());
         }
         let is_taken = |piece: u32| own.get(piece as usize).is_some_and(|cells| !cells.is_empty());
-        let held = surface.take_out(&CellRows::from_cells(&own.concat()), is_taken);
+        let held = surface.take_out(&CellRows::from_cells(&own.concat()), solid, is_taken);
         for piece in &taken {
             self.all[*piece] = Measured { place: self.all[*piece].place, ..Measured::default() };
         }

@@ -8,7 +8,7 @@ use super::*;
 use crate::carried::{LiquidMaterial, MaterialPoints};
 use crate::rows::{Cell, CellRows, Periods};
 use crate::step::{
-    Domain, Liquid, LiquidSettings, LiquidSource, Motion, Moving, SourceShape, Surface, Surroundings, Wall,
+    Domain, Liquid, LiquidSettings, LiquidSource, Motion, Moving, Solid, SourceShape, Surface, Surroundings, Wall,
 };
 use crate::velocity::{MacVelocity, Site};
 
@@ -224,12 +224,15 @@ fn a_piece_smaller_than_a_cell_is_lost_with_its_volume_but_not_beside_a_solid() 
     assert!(targets.correct(&mut surface, None).lost.is_empty());
 }
 
-/// The cells of a drop hold more than its mesh encloses: that comes back to the pool, also beside a periodic side.
+/// The cells of a drop hold more than its mesh encloses: that comes back to the pool, also beside a periodic side or a wall that the pool
+/// goes on into.
 #[test]
 fn what_a_lost_piece_held_besides_its_volume_is_owed_to_the_rest() {
     let closed = Domain::closed([0; 3], [24, 20, 20]);
     let across = Domain { walls: [[Wall::Periodic; 2], [Wall::Closed; 2], [Wall::Closed; 2]], ..closed };
-    for (domain, x) in [(closed, 14.0), (across, 1.0)] {
+    let wall = |p: Vec3| 17.3 - p[0];
+    let in_time = |_: f64, p: Vec3| wall(p);
+    for (domain, x, has_wall) in [(closed, 14.0, false), (across, 1.0, false), (closed, 14.0, true)] {
         for resolution in [1, 2] {
             // In the middle of a surface cell.
             let (size, half) = (resolution as f32, 0.5 / resolution as f32);
@@ -238,22 +241,55 @@ fn what_a_lost_piece_held_besides_its_volume_is_owed_to_the_rest() {
                 ball([x, 14.0, 10.0].map(|x| x + half), 0.8 / size)([way, p[1], p[2]])
             };
             let mut surface = MarkedSurface::new(domain, resolution, |p| (p[1] - 6.0).min(drop(p)), 0, 1);
-            let mut targets = VolumeTargets::new(&mut surface, 1.0, None);
-            let cells = CellRows::cuboid(domain.low, domain.high);
-            let held =
-                |surface: &MarkedSurface| surface.shares(&cells).iter().map(|share| f64::from(*share)).sum::<f64>();
-            let before = held(&surface);
-            let report = targets.measure(&mut surface, None, None);
+            let solid = has_wall.then_some(&wall as &Distance<'_>);
+            if let Some(solid) = solid {
+                surface.meet(solid);
+            }
+            let mut targets = VolumeTargets::new(&mut surface, 1.0, solid);
+            let before = surface.held(solid);
+            let report = targets.measure(&mut surface, solid, None);
             let [lost] = &report.lost[..] else { panic!("{report:?}") };
             let owed: f64 = report.owed.iter().map(|(_, volume)| f64::from(*volume)).sum();
-            let left = held(&surface);
+            let left = surface.held(solid);
             let taken = before - left;
             assert_near(owed + lost.volume, taken, 1e-4);
             assert!(taken > 2.0 * lost.volume, "{resolution}: {taken} {lost:?}");
             let mut liquid = Liquid::new(LiquidSettings::new(domain, 1.0), surface);
-            liquid.give(&report.owed);
-            assert_near(held(liquid.surface()) - left, owed, 0.02);
+            let around = Surroundings { solid: has_wall.then_some(Solid::still(&in_time)), ..FALLING };
+            liquid.give(&report.owed, &around, 0.0);
+            assert_near(liquid.surface().held(solid) - left, owed, 0.01);
         }
+    }
+}
+
+/// A dam of 1 Pa·s runs down stairs in films, whose mesh encloses more or less than cells hold.
+#[test]
+fn raw_drift_is_what_the_drift_is_without_correction() {
+    let stairs = |p: Vec3| (p[0] - 9.3).max(p[1] - 5.2).min((p[0] - 15.4).max(p[1] - 2.6));
+    let in_time = |_: f64, p: Vec3| stairs(p);
+    let around = Surroundings { solid: Some(Solid::still(&in_time)), viscosity: &|_| 1.0, ..FALLING };
+    let cook = |is_corrected: bool| {
+        let domain = Domain::closed([0; 3], [24, 16, 6]);
+        let mut surface = MarkedSurface::new(domain, 1, |p| (p[0] - 7.0).max(p[1] - 12.0), 0, 1);
+        surface.meet(&stairs);
+        let mut targets = VolumeTargets::new(&mut surface, CELL, Some(&stairs));
+        let mut liquid = Liquid::new(LiquidSettings::new(domain, CELL), surface);
+        let reports = (0..48).map(|_| {
+            liquid.step_frame(&around, FRAME);
+            let report = match is_corrected {
+                true => targets.correct(liquid.surface_mut(), Some(&stairs)),
+                false => targets.measure(liquid.surface_mut(), Some(&stairs), None),
+            };
+            liquid.give(&report.owed, &around, FRAME);
+            report
+        });
+        reports.collect::<Vec<_>>()
+    };
+    let [corrected, alone] = [true, false].map(cook);
+    for (n, (corrected, alone)) in corrected.iter().zip(&alone).enumerate() {
+        assert_eq!((alone.raw_drift, alone.corrected), (alone.drift, 0.0), "{n}");
+        let apart = corrected.raw_drift - alone.drift;
+        assert!(apart.abs() < 0.025 && corrected.drift.abs() < 5e-3, "{n}: {apart} {corrected:?}");
     }
 }
 
