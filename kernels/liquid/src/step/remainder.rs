@@ -36,7 +36,7 @@ const LITTLE_SURFACE: f64 = 32.0;
 /// The area, ÷ cell², of surface that anything can be given to.
 const LEAST_SURFACE: f64 = 1.0;
 
-/// How far, in cells, a surface swells in a region at least for a second look at what it lacks.
+/// How far, in cells, a surface swells in a region at least for another look at what it lacks.
 const WORTH_A_LOOK: f64 = 0.03;
 
 /// Stretches of cells that are summed each by itself, so that threads may share the work.

@@ -215,7 +215,7 @@ pub(super) fn substep(
     if let Some(solid) = solid {
         surface.meet(&|point| solid.distance(point));
     }
-    // What moves farther ends anywhere, and a second look would add to that.
+    // What moves farther ends anywhere, and another look would add to that.
     let looks = if reach < FARTHEST { LOOKS } else { 1 };
     Remainder::of(Some(&flow), &held, &others, reach).give_back(surface, looks);
     let passed =
