@@ -527,6 +527,16 @@ impl<'a> Finder<'a> {
         (span.base != NOWHERE).then(|| span.at(x))
     }
 
+    /// The same, where `len` cells from there along x are stored.
+    #[inline(always)]
+    pub(crate) fn find_run(&self, [x, y, z]: Cell, len: i32) -> Option<usize> {
+        let (row, mut span) = self.last[(y & 3 | (z & 3) << 2) as usize].get();
+        if row != [y, z] || !span.contains(x) {
+            span = self.look_up([x, y, z]);
+        }
+        (span.base != NOWHERE && x + len <= span.end).then(|| span.at(x))
+    }
+
     #[inline(never)]
     fn look_up(&self, [x, y, z]: Cell) -> RowSpan {
         let span = self.rows.span_or_gap([x, y, z]);

@@ -163,7 +163,7 @@ fn zeros(line: &mut Vec<f32>, len: usize) -> &mut [f32] {
 /// `line` += `weight` · the values of the cells of a row from `from` on, 0 where they are not stored. Drops the spans before
 /// them from the row: calls for a row ascend.
 #[inline(always)]
-fn add_row(row: &mut &[RowSpan], field: &[f32], from: i32, weight: f32, line: &mut [f32]) {
+pub(crate) fn add_row(row: &mut &[RowSpan], field: &[f32], from: i32, weight: f32, line: &mut [f32]) {
     if weight == 0.0 {
         return;
     }

@@ -10,6 +10,7 @@ use crate::step::domain::{Domain, Obstacle, share_outside};
 use crate::step::fullness::{Neighbours, fullness};
 use crate::step::motion::{Motion, hold_walls};
 use crate::step::shares::inner;
+use crate::transfer::add_row;
 use crate::velocity::{FaceFields, FaceMask, Sampler, Site};
 
 /// What a cell gains or loses in a substep, ÷ its volume, that is not worth a look.
@@ -93,9 +94,9 @@ pub struct Swelling<'a> {
 impl<'a> Swelling<'a> {
     /// The swelling that keeps the volume of the liquid of `view` in `flow`; `None` where nothing is pressed together or pulled apart.
     pub(super) fn of(flow: &Moving<'a>, view: &PhiView<'_>, domain: &Domain) -> Option<Self> {
-        let (rows, faces, periods) = (flow.velocity.rows(), flow.velocity.faces(), domain.periods());
+        let (rows, faces) = (flow.velocity.rows(), flow.velocity.faces());
         // What of each cell's liquid has to go elsewhere, ÷ the area of the surface around it.
-        let [outward] = rows.tabulate_with(
+        let [mut outward] = rows.tabulate_with(
             || (Finder::new(rows), Finder::new(view.rows)),
             |(finder, phis), cell, at| {
                 let phi = phis.find(inner(domain, cell)).map_or(view.outside, |at| view.phi[at]);
@@ -116,20 +117,11 @@ impl<'a> Swelling<'a> {
                 [inflow * liquid / area(&around).max(LEAST_AREA)]
             },
         );
-        let (mut by, finder, mut is_any) = (vec![0.0; rows.len()], Finder::new(rows), false);
-        for (cell, outward) in rows.iter().zip(outward).filter(|(_, outward)| *outward != 0.0) {
-            is_any = true;
-            for [x, y, z] in (0..27).map(|n| offset(n, 3)) {
-                if let Some(at) = finder.find(periods.home([cell[0] + x, cell[1] + y, cell[2] + z])) {
-                    by[at] += outward;
-                }
-            }
-        }
-        if !is_any {
+        if outward.iter().all(|outward| *outward == 0.0) {
             return None;
         }
-        by.iter_mut().for_each(|by| *by = by.clamp(-MOST, MOST));
-        Some(Self::new(rows, by, domain))
+        domain.periods().images(rows).fill(&mut outward);
+        Some(Self::new(rows, sums_around(rows, &outward, MOST), domain))
     }
 
     /// By so many cells at the middle of each of `rows`.
@@ -153,6 +145,24 @@ impl<'a> Swelling<'a> {
             sampler.value(&self.by, Site::Centre, inner)
         }
     }
+}
+
+/// The sum of the values of the 27 cells around each, ± `most` at most.
+fn sums_around(rows: &CellRows, values: &[f32], most: f32) -> Vec<f32> {
+    let [sums] = rows.tabulate_parts(|spans, first, [sums]| {
+        let mut line = Vec::new();
+        for ([y, z], span) in spans {
+            line.clear();
+            line.resize(span.len() + 2, 0.0);
+            for [_, j, k] in (0..27).step_by(3).map(|n| offset(n, 3)) {
+                add_row(&mut rows.row(y + j, z + k), values, span.start - 1, 1.0, &mut line);
+            }
+            for (sum, around) in sums[span.at(span.start) - first..].iter_mut().zip(line.windows(3)) {
+                *sum = (around[0] + around[1] + around[2]).clamp(-most, most);
+            }
+        }
+    });
+    sums
 }
 
 /// The faces of a cell.

@@ -46,6 +46,7 @@ mod passed;
 mod pools;
 mod pour;
 mod project;
+mod regions;
 mod remainder;
 mod shape_cells;
 mod shares;
@@ -68,7 +69,7 @@ pub use substep::{Moving, Owed, Surface, Surroundings};
 use self::exchange::Exchange;
 use self::mean::Kept;
 use self::pools::Pools;
-use self::remainder::{Held, Others, Remainder};
+use self::remainder::{Held, NEAR, Others, Remainder};
 use self::sources::Span;
 use self::substep::LOOKS;
 use crate::carried::{LiquidMaterial, MaterialPoints, TracerPoints};
@@ -346,7 +347,8 @@ impl<S: Surface> Liquid<S> {
             shapes: &[],
             time: seconds,
         };
-        let held = Held::of(&view.rows.clone(), &self.surface, &others, 0.0);
+        let rows = view.rows.filtered(|_, at| view.phi[at] < NEAR);
+        let held = Held::of(&rows, &self.surface, &others, 0.0);
         let mut remainder = Remainder::of(None, &held, &others, 0.0);
         remainder.owe(owed);
         remainder.give_back(&mut self.surface, LOOKS);

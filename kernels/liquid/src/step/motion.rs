@@ -11,7 +11,7 @@ use crate::step::domain::{Domain, Obstacle};
 use crate::step::flight::flying;
 use crate::step::outflow::Outflow;
 use crate::step::sources::FlowAccount;
-use crate::step::substep::most_layers;
+use crate::step::substep::{layers, most_layers};
 use crate::step::{LiquidSettings, Moving, Surface, Surroundings, Wall};
 use crate::velocity::{ALL_FACES, FaceFields, FaceMask, MacVelocity, Sampler, Site, Slopes, extrapolate, resampled};
 
@@ -165,6 +165,20 @@ impl Motion {
         domain.clip_with_images(&self.rows().rounded_within(layers - 1, low, high), layers + 1)
     }
 
+    /// The same as far past the liquid as it comes in a substep in which it moves with a velocity, by `step` cells at 1 m/s and by
+    /// `reach` cells at most: less far where it is slow.
+    pub(super) fn rows_in_reach(&self, domain: &Domain, velocity: &FaceFields<f32>, step: f32, reach: f32) -> CellRows {
+        let [low, high] = domain.reach(layers(reach) + 1);
+        let past = |rows: &CellRows, reach: f32| rows.rounded_within(layers(reach) - 1, low, high);
+        let is_fast = |_, at: usize| velocity.iter().any(|field| field[at].abs() * step > SLOW);
+        let rows = if reach <= SLOW {
+            past(self.rows(), reach)
+        } else {
+            past(self.rows(), SLOW).union(&past(&self.rows().filtered(is_fast), reach))
+        };
+        domain.clip_with_images(&rows, layers(reach) + 1)
+    }
+
     /// A velocity on other cells with what the last substep gained, where that is known: liquid at rest and in free fall
     /// goes on as it did.
     pub(super) fn with_last_gain(&self, cells: &LiquidCells, faces: &FaceFields<f32>, seconds: f64) -> FaceFields<f32> {
@@ -202,6 +216,9 @@ impl Motion {
         })
     }
 }
+
+/// Cells that slow liquid moves in a substep, at most.
+const SLOW: f32 = 1.0;
 
 /// The largest component of a velocity.
 pub(super) fn largest_of(faces: &FaceFields<f32>) -> f64 {

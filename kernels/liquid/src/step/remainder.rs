@@ -1,21 +1,19 @@
 //! The liquid that a surface does not keep as it moves, given back in each region of it.
 
+use std::mem::replace;
+
 use numerics::vector::{Vec3, scale, sub};
 
-use crate::fields::add_scaled;
 use crate::level_set::{PhiView, floor};
-use crate::rows::{Cell, CellRows, Finder, Periods, PlacedSpan};
+use crate::rows::{Cell, CellRows, Finder, PlacedSpan};
 use crate::step::continuity::Swelling;
 use crate::step::domain::{Domain, Obstacle, Wall};
 use crate::step::pools::Pools;
+use crate::step::regions::{Lack, Regions, Sums};
 use crate::step::shares::{Shares, WHOLE, inner};
 use crate::step::sources::SourceShape;
 use crate::step::{Moving, Owed, Surface};
 use crate::velocity::Site;
-
-/// The side of a region, in cells. It is less along a periodic axis, of which regions make up the whole. Of small regions, the error of where
-/// liquid was disturbs a ball that spins.
-const SIZE: i32 = 24;
 
 /// A way outward, in cells, by which what a cell gains by one is measured.
 const WAY: f32 = 0.1;
@@ -24,27 +22,19 @@ const WAY: f32 = 0.1;
 pub(super) const SHOWN: f32 = 0.5;
 
 /// |φ| of a cell, in cells, up to which what moves the surface is read.
-const NEAR: f32 = 4.0;
-
-/// How far a surface moves for what it has lost in a substep, cells, at most.
-const MOST: f64 = 0.25;
-
-/// A region with this area of surface, ÷ cell², moves it half by what it lacks itself, half by what it and its neighbours lack
-/// together. With less area the neighbours count for more: what few cells lack is mostly noise.
-const LITTLE_SURFACE: f64 = 32.0;
-
-/// The area, ÷ cell², of surface that anything can be given to.
-const LEAST_SURFACE: f64 = 1.0;
+pub(super) const NEAR: f32 = 4.0;
 
 /// How far, in cells, a surface swells in a region at least for another look at what it lacks.
 const WORTH_A_LOOK: f64 = 0.03;
 
+/// Share of what regions lacked before the surface last swelled, from which on they will not lack much less if it swells again.
+const STUCK: f64 = 0.5;
+
+/// How far a surface swells in any region, in cells, at least: less is rounding.
+const LEAST_WAY: f64 = 1e-7;
+
 /// Stretches of cells that are summed each by itself, so that threads may share the work.
 pub(super) const STRETCHES: usize = 64;
-
-/// Distance from a solid, in cells, up to which what is missing belongs to what is beside the solid, and from which on it does not:
-/// liquid that comes to a stop there gives up its place to none that still moves.
-const BESIDE_SOLID: [f32; 2] = [3.0, 6.0];
 
 /// Cells, besides its way, within which liquid comes in or goes by other ways: through an open side, a source or a sink.
 const BESIDE: f32 = 2.0;
@@ -162,19 +152,25 @@ pub(super) struct Remainder<'a> {
     others: &'a Others<'a>,
     reach: f32,
     regions: Regions<'a>,
-    lack: Lack,
+    /// The volume that is missing, and whether others are near, by box.
+    missing: Sums,
+    is_apart: Vec<bool>,
     /// What cells held when they were last counted; empty before.
     counted: Vec<f32>,
     /// How far the surface last swelled in any region, in cells.
     farthest: f64,
+    /// What regions lacked in all when cells were last counted, and whether that was not much less than the time before.
+    lacked: f64,
+    is_stuck: bool,
 }
 
 impl<'a> Remainder<'a> {
     pub(super) fn of(flow: Option<&'a Moving<'a>>, held: &'a Held, others: &'a Others<'a>, reach: f32) -> Self {
         let [_, solid] = others.counted();
         let regions = Regions::of(&held.rows, others.domain, solid);
-        let lack = Lack::none(&regions, held.accounts());
-        Self { flow, held, others, reach, regions, lack, counted: Vec::new(), farthest: f64::INFINITY }
+        let (missing, is_apart) = (Sums::none(&regions, held.accounts()), vec![false; regions.len()]);
+        let (counted, farthest, lacked, is_stuck) = (Vec::new(), f64::INFINITY, f64::INFINITY, false);
+        Self { flow, held, others, reach, regions, missing, is_apart, counted, farthest, lacked, is_stuck }
     }
 
     /// Counts these volumes as missing, too.
@@ -183,7 +179,7 @@ impl<'a> Remainder<'a> {
         for (place, volume) in owed {
             let at = finder.find(inner(self.others.domain, place.map(floor)));
             let account = at.map_or(0, |at| self.held.account(at));
-            near(*place).add(&mut self.lack.volume, account, f64::from(*volume));
+            near(*place).iter().for_each(|place| self.missing.add(place, account, f64::from(*volume)));
         }
     }
 
@@ -196,30 +192,46 @@ impl<'a> Remainder<'a> {
     }
 
     /// How far the surface swells for what is missing; `None` where nothing is, or what is missing since it last swelled is not worth
-    /// a look: what thin sheets gain is not in proportion to how far they swell, but little where that is little.
+    /// a look: what thin sheets gain is not in proportion to how far they swell, but little where that is little. What was no less the
+    /// last time will be no less the next time, either.
     fn swelling(&mut self, surface: &dyn Surface) -> Option<Swelling<'a>> {
-        if self.farthest < WORTH_A_LOOK {
+        if self.farthest < WORTH_A_LOOK || self.is_stuck {
             return None;
         }
-        self.count(surface);
-        let Self { held, others, regions, lack, .. } = &*self;
-        let pools = held.pools.as_ref();
-        let ways = lack.ways(regions, pools.map_or(1, Pools::count));
-        let account = |at: usize| pools.map_or(Some(0), |pools| pools.at(at));
-        let swelling = swelling(&ways, regions, &held.rows, surface, (others.domain, account));
+        let lack = self.count(surface);
+        let lacked = replace(&mut self.lacked, lack.sum());
+        self.is_stuck = self.lacked > STUCK * lacked;
+        let ways = lack.ways(&self.regions, self.held.pools.as_ref().map_or(1, Pools::count));
         self.farthest = ways.iter().fold(0.0, |farthest, way| way.abs().max(farthest));
-        swelling
+        (self.farthest > LEAST_WAY).then(|| self.swelling_by(&ways, surface))
     }
 
-    /// Takes what cells hold now from what is missing, in place of what they held when they were last counted.
-    fn count(&mut self, surface: &dyn Surface) {
+    /// How far the surface swells if it does by `ways`, in cells, in the middle of each region.
+    fn swelling_by(&self, ways: &[f64], surface: &dyn Surface) -> Swelling<'a> {
+        let Self { held, regions, .. } = self;
+        let (view, domain, ways) = (surface.view(), self.others.domain, regions.to_read(ways));
+        let account = |at: usize| held.pools.as_ref().map_or(Some(0), |pools| pools.at(at));
+        let [by] = held.rows.tabulate_with(
+            || (Finder::new(view.rows), regions.reader()),
+            |(phis, near), cell, at| {
+                let phi = phis.find(inner(domain, cell)).map_or(view.outside, |at| view.phi[at]);
+                let Some(account) = account(at).filter(|_| phi.abs() <= NEAR) else { return [0.0] };
+                [near(Site::Centre.of(cell)).map_or(0.0, |place| place.read(&ways, account) as f32)]
+            },
+        );
+        Swelling::new(&held.rows, by, domain)
+    }
+
+    /// Takes what cells hold now from what is missing, in place of what they held when they were last counted; what regions then lack.
+    fn count(&mut self, surface: &dyn Surface) -> Lack {
         let Self { flow, held, others, reach, regions, .. } = &*self;
         let [_, solid] = others.counted();
         let (shares, is_first) = (Shares::of(surface, others.domain, solid), self.counted.is_empty());
         let parts = held.rows.map_stretches(STRETCHES, |spans| {
             let (mut share, mut way) = (shares.reader(), flow.map(Moving::reader));
             let [mut near, mut near_before, mut near_now] = [(); 3].map(|()| regions.reader());
-            let (mut lack, mut counted) = (Lack::none(regions, held.accounts()), Vec::new());
+            let [mut missing, mut area] = [(); 2].map(|()| Sums::none(regions, held.accounts()));
+            let (mut apart, mut counted) = (Vec::new(), Vec::new());
             let finder = Finder::new(&held.rows);
             for (cell, n) in spans.iter().flat_map(cells_of) {
                 let ([now, more, less], middle) = share(cell, [0.0, WAY, -WAY]);
@@ -229,13 +241,18 @@ impl<'a> Remainder<'a> {
                 let is_new = came != 0.0 || is_first && more.max(before) > 0.0;
                 let is_apart = is_new && flow.is_some() && others.are_near(cell, reach + BESIDE);
                 let own = held.account(n);
-                if gain != 0.0 || is_apart {
-                    let place = near(Site::Centre.of(cell));
-                    place.add(&mut lack.area, own, f64::from(gain));
-                    place.at.into_iter().for_each(|(at, _)| lack.is_apart[at] |= is_apart);
+                if (gain != 0.0 || is_apart)
+                    && let Some(place) = near(Site::Centre.of(cell))
+                {
+                    area.add(&place, own, f64::from(gain));
+                    if is_apart && apart.last() != Some(&place.in_box()) {
+                        apart.push(place.in_box());
+                    }
                 }
-                if before > 0.0 {
-                    near_before(held.middle(n)).add(&mut lack.volume, own, f64::from(before));
+                if before > 0.0
+                    && let Some(place) = near_before(held.middle(n))
+                {
+                    missing.add(&place, own, f64::from(before));
                 }
                 if came != 0.0 {
                     let from = way.as_mut().map_or(middle, |way| {
@@ -243,217 +260,26 @@ impl<'a> Remainder<'a> {
                         sub(middle, way(halfway))
                     });
                     let account = held.account_of(&finder, others.domain, n, from);
-                    near_now(from).add(&mut lack.volume, account, -f64::from(came));
+                    near_now(from).iter().for_each(|place| missing.add(place, account, -f64::from(came)));
                 }
             }
-            (lack, counted)
+            (missing, area, apart, counted)
         });
-        self.lack.area.fill(0.0);
+        let mut all = Sums::none(&self.regions, self.held.accounts());
         self.counted.clear();
-        for (lack, counted) in parts {
-            self.lack.add(&lack);
+        for (missing, area, apart, counted) in parts {
+            self.missing.add_all(&missing);
+            all.add_all(&area);
+            apart.into_iter().for_each(|at| self.is_apart[at] = true);
             self.counted.extend(counted);
         }
+        Lack::of(&self.regions, &self.missing, &all, &self.is_apart)
     }
 }
 
 /// The cells of a span, and where the value of each is in a field.
 pub(super) fn cells_of(([y, z], span): &PlacedSpan) -> impl Iterator<Item = (Cell, usize)> {
     (span.start..span.end).map(move |x| ([x, *y, *z], span.at(x)))
-}
-
-/// Regions of the domain, each with a weight that falls linearly from its middle to those of the regions beside. In each, what is beside a
-/// solid and what is not have an account of their own.
-struct Regions<'a> {
-    cells: CellRows,
-    solid: Option<Obstacle<'a>>,
-    /// Cells along a region's sides.
-    width: Vec3,
-    /// After how many regions they repeat.
-    periods: Periods,
-}
-
-impl<'a> Regions<'a> {
-    /// Those of `rows`, and those beside.
-    fn of(rows: &CellRows, domain: &Domain, solid: Option<Obstacle<'a>>) -> Self {
-        let cells = domain.periods().0;
-        let periods = cells.map(|period| if period > 0 { ((period + SIZE / 2) / SIZE).max(1) } else { 0 });
-        let width = [0, 1, 2].map(|axis| match periods[axis] {
-            0 => SIZE as f32,
-            regions => cells[axis] as f32 / regions as f32,
-        });
-        let region = |axis: usize, at: i32| floor((at as f32 + 0.5) / width[axis]);
-        let (low, high) = rows.bounds().unwrap_or(([0; 3], [1; 3]));
-        let first = [region(1, low[1]), region(2, low[2])];
-        let size = [region(1, high[1]) + 1 - first[0], region(2, high[2]) + 1 - first[1]];
-        let of_region = |axis: usize, at: i32| {
-            let end = |at: i32| (at as f32 * width[axis]).ceil() as i32;
-            end(at)..end(at + 1)
-        };
-        let stored = CellRows::from_ranges(first, size, |y, z, out| {
-            for (y, z) in of_region(2, z).flat_map(|z| of_region(1, y).map(move |y| (y, z))) {
-                out.extend(rows.row(y, z).iter().map(|span| region(0, span.start)..region(0, span.end - 1) + 1));
-            }
-        });
-        let (stored, periods) = (stored.dilated(1), Periods(periods));
-        let cells = if periods.any() { periods.gathered(stored) } else { stored };
-        Self { cells, solid, width, periods }
-    }
-
-    /// A region and those beside it, where they are stored.
-    fn around(&self, [x, y, z]: Cell) -> impl Iterator<Item = usize> {
-        let region = move |n: i32| self.periods.home([x + n % 3 - 1, y + n / 3 % 3 - 1, z + n / 9 - 1]);
-        (0..27).filter_map(move |n| self.cells.find(region(n)))
-    }
-
-    /// The regions around a place in cells, and their weights. Fast where successive places are near each other.
-    fn reader(&self) -> impl FnMut(Vec3) -> Weights + use<'_> {
-        let (mut last, mut at_corners) = ([i32::MIN; 3], [None; 8]);
-        move |place| {
-            let at = [0, 1, 2].map(|axis| place[axis] / self.width[axis] - 0.5);
-            let corner = at.map(floor);
-            let t = [0, 1, 2].map(|axis| f64::from(at[axis] - corner[axis] as f32));
-            let side = |k: usize| [k & 1, k >> 1 & 1, k >> 2];
-            if corner != last {
-                last = corner;
-                at_corners = std::array::from_fn(|k| {
-                    let region = [0, 1, 2].map(|axis| corner[axis] + side(k)[axis] as i32);
-                    self.cells.find(self.periods.home(region))
-                });
-            }
-            let at = std::array::from_fn(|k| {
-                let along = |axis: usize| if side(k)[axis] == 1 { t[axis] } else { 1.0 - t[axis] };
-                at_corners[k].map_or((0, 0.0), |at| (at, along(0) * along(1) * along(2)))
-            });
-            let [near, far] = BESIDE_SOLID;
-            let beside = self.solid.map_or(0.0, |solid| ((far - solid.distance(place)) / (far - near)).clamp(0.0, 1.0));
-            Weights { at, beside: f64::from(beside), regions: self.cells.len() }
-        }
-    }
-}
-
-/// What a place counts for in the regions around it.
-struct Weights {
-    at: [(usize, f64); 8],
-    /// The share that counts for what is beside a solid.
-    beside: f64,
-    regions: usize,
-}
-
-impl Weights {
-    /// Where each region is in what has, for each account, one value for each, and then one for what is beside a solid in each; and its
-    /// weight.
-    fn iter(&self, account: usize) -> impl Iterator<Item = (usize, f64)> {
-        let first = 2 * account * self.regions;
-        let parts = [(first, 1.0 - self.beside), (first + self.regions, self.beside)]
-            .into_iter()
-            .filter(|(_, share)| *share > 0.0);
-        parts.flat_map(|(first, share)| self.at.iter().map(move |(at, weight)| (first + at, share * weight)))
-    }
-
-    fn add(&self, sums: &mut [f64], account: usize, value: f64) {
-        self.iter(account).for_each(|(at, weight)| sums[at] += weight * value);
-    }
-}
-
-/// What regions lack.
-struct Lack {
-    /// The volume that is missing in each, and then beside a solid in each, for each account; ÷ cell³.
-    volume: Vec<f64>,
-    /// What each gains by a way outward, ÷ that and cell².
-    area: Vec<f64>,
-    /// Which lose and gain nothing.
-    is_apart: Vec<bool>,
-}
-
-impl Lack {
-    fn none(regions: &Regions<'_>, accounts: usize) -> Self {
-        let len = regions.cells.len();
-        Self { volume: vec![0.0; 2 * len * accounts], area: vec![0.0; 2 * len * accounts], is_apart: vec![false; len] }
-    }
-
-    fn add(&mut self, other: &Self) {
-        add_scaled(&mut self.volume, 1.0, &other.volume);
-        add_scaled(&mut self.area, 1.0, &other.area);
-        self.is_apart.iter_mut().zip(&other.is_apart).for_each(|(own, other)| *own |= other);
-    }
-
-    /// How far the surface in each region swells, in cells, for the first of the accounts. What is missing in the others is given to
-    /// these: to those of its region by their surface there, or, where there is none, everywhere.
-    fn ways(&self, regions: &Regions<'_>, accounts: usize) -> Vec<f64> {
-        let (len, mut volume) = (2 * regions.cells.len(), self.volume.clone());
-        let (rest, mut left) = (volume.split_off(accounts * len), 0.0);
-        for (at, missing) in rest.into_iter().enumerate().filter(|(at, _)| !self.is_apart[at % regions.cells.len()]) {
-            let own = (0..accounts).map(|account| account * len + at);
-            left += self.share_out(regions, missing, own, &mut volume);
-        }
-        self.share_out(regions, left, 0..accounts * len, &mut volume);
-        let mut ways = vec![0.0; self.volume.len()];
-        (0..accounts).for_each(|account| self.set_ways(regions, account * len, &volume, &mut ways));
-        ways
-    }
-
-    /// Adds what is missing to what these have in `volume`, by their surface; returns it where they have none.
-    fn share_out(
-        &self,
-        regions: &Regions<'_>,
-        missing: f64,
-        to: impl Iterator<Item = usize> + Clone,
-        volume: &mut [f64],
-    ) -> f64 {
-        let surface = |at: usize| if self.is_apart[at % regions.cells.len()] { 0.0 } else { self.area[at].max(0.0) };
-        let sum: f64 = to.clone().map(surface).sum();
-        if sum <= LEAST_SURFACE {
-            return missing;
-        }
-        to.for_each(|at| volume[at] += missing * surface(at) / sum);
-        0.0
-    }
-
-    /// Sets how far the surface in each region swells for the account that begins at `first`, where `volume` is missing.
-    fn set_ways(&self, regions: &Regions<'_>, first: usize, volume: &[f64], ways: &mut [f64]) {
-        let Self { area, is_apart, .. } = self;
-        let len = regions.cells.len();
-        let counted = || {
-            let own = regions.cells.iter().enumerate().filter(|(at, _)| !is_apart[*at]);
-            own.flat_map(move |(at, region)| [first, first + len].map(|first| (first, first + at, region)))
-        };
-        let (mut left, mut surface) = (0.0, 0.0);
-        for (first, at, region) in counted() {
-            let around = regions.around(region).filter(|at| !is_apart[*at]).map(|at| first + at);
-            let (missing, room) =
-                around.fold((0.0, 0.0), |(volumes, areas), at| (volumes + volume[at], areas + area[at]));
-            let usual = if room > LEAST_SURFACE { missing / room } else { 0.0 };
-            ways[at] = (volume[at] + LITTLE_SURFACE * usual) / (area[at] + LITTLE_SURFACE);
-            left += volume[at] - ways[at] * area[at];
-            surface += area[at];
-        }
-        let everywhere = left / f64::max(surface, LEAST_SURFACE);
-        counted().for_each(|(_, at, _)| ways[at] = (ways[at] + everywhere).clamp(-MOST, MOST));
-    }
-}
-
-/// How far a surface swells if it does by `ways`, in cells, in the middle of each region; `None` where that is nothing.
-fn swelling<'a>(
-    ways: &[f64],
-    regions: &Regions<'_>,
-    rows: &'a CellRows,
-    surface: &dyn Surface,
-    (domain, account): (&Domain, impl Fn(usize) -> Option<usize> + Sync),
-) -> Option<Swelling<'a>> {
-    if ways.iter().all(|way| *way == 0.0) {
-        return None;
-    }
-    let view = surface.view();
-    let [by] = rows.tabulate_with(
-        || (Finder::new(view.rows), regions.reader()),
-        |(phis, near), cell, at| {
-            let phi = phis.find(inner(domain, cell)).map_or(view.outside, |at| view.phi[at]);
-            let Some(account) = account(at).filter(|_| phi.abs() <= NEAR) else { return [0.0] };
-            [near(Site::Centre.of(cell)).iter(account).fold(0.0, |sum, (at, weight)| sum + weight * ways[at]) as f32]
-        },
-    );
-    Some(Swelling::new(rows, by, domain))
 }
 
 #[cfg(test)]

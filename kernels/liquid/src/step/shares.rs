@@ -1,5 +1,6 @@
 //! How much of cells is liquid.
 
+use numerics::simd::{Path, kernel};
 use numerics::vector::{Vec3, add, dot, length};
 
 use crate::level_set::PhiView;
@@ -47,10 +48,9 @@ impl<'a> Shares<'a> {
     /// The shares of a cell that are liquid if the surface moves outward by so many cells, and the middle of the first of them, in
     /// cells: by φ in the middle of 2³ parts of each surface cell. Fast where successive cells are near each other.
     pub(crate) fn reader<const N: usize>(&self) -> impl FnMut(Cell, [f32; N]) -> ([f32; N], Vec3) {
-        let (coarse, around) = (Finder::new(self.view.rows), self.around());
+        let (path, coarse, around) = (Path::chosen(), Finder::new(self.view.rows), self.around());
         let (mut near, mut heights) = (Vec::new(), Vec::new());
-        let (fine, size) = (self.fine as usize, self.fine as usize + 2);
-        let unit = fine as f32;
+        let fine = self.fine as usize;
         move |cell, outward| {
             let phi = coarse.find(cell).map_or(self.view.outside, |at| self.view.phi[at]);
             let height = self
@@ -64,26 +64,11 @@ impl<'a> Shares<'a> {
             }
             around(cell, &mut near);
             let solid = self.solid.filter(|_| height < CUT);
+            heights.clear();
             if let Some(solid) = solid {
                 self.heights(solid, cell, &mut heights);
             }
-            let (mut sums, mut moment) = ([0.0; N], [0.0; 3]);
-            for n in 0..fine * fine * fine {
-                let own = [n % fine, n / fine % fine, n / fine / fine];
-                let [x, y, z] = own.map(|along| along + 1);
-                let (at, steps) = (x + size * (y + size * z), [1, size, size * size]);
-                let (phi, places) = (parts(&near, at, steps), places(own));
-                let covered = solid.map(|_| covered(&heights, at, steps));
-                let aligned = covered.map_or(0.0, |(_, out)| cosine(slope(&phi), out));
-                let covered = covered.map(|(shares, _)| shares);
-                for (k, place) in places.into_iter().enumerate() {
-                    let free = covered.map_or(1.0, |covered| 1.0 - covered[k]);
-                    let shares =
-                        outward.map(|outward| share_of_both(share_below(phi[k] - unit * outward), free, aligned));
-                    (0..N).for_each(|n| sums[n] += shares[n]);
-                    (0..3).for_each(|axis| moment[axis] += shares[0] * place[axis]);
-                }
-            }
+            let (sums, moment) = sums_of(path, &near, &heights, fine, outward);
             let middle = moment.map(|moment| moment / (sums[0].max(f32::MIN_POSITIVE) * fine as f32));
             let middle = if sums[0] > 0.0 { middle } else { [0.5; 3] };
             (sums.map(|sum| sum / (8 * fine * fine * fine) as f32), add(cell.map(|x| x as f32), middle))
@@ -93,7 +78,6 @@ impl<'a> Shares<'a> {
     /// The heights of the surface cells of a cell and those around above a solid, in surface cells, x fastest.
     fn heights(&self, solid: Obstacle<'_>, cell: Cell, heights: &mut Vec<f32>) {
         let (fine, size) = (self.fine as f32, self.fine as usize + 2);
-        heights.clear();
         heights.extend((0..size * size * size).map(|n| {
             let own = [n % size, n / size % size, n / size / size];
             let place = [0, 1, 2].map(|axis| cell[axis] as f32 + (own[axis] as f32 - 0.5) / fine);
@@ -111,19 +95,20 @@ impl<'a> Shares<'a> {
             period => start[axis] + (at - start[axis]).rem_euclid(period),
         };
         move |cell, near| {
-            let first = cell.map(|x| r * x - 1);
-            let [x0, x1] = [first[0], first[0] + size - 1].map(|x| along(0, x));
+            let [x, y, z] = cell.map(|x| r * x - 1);
+            // Beyond the sides a row ends, or repeats.
+            let is_row = x == along(0, x) && x + size - 1 == along(0, x + size - 1);
             near.clear();
-            for n in 0..size * size {
-                let [y, z] = [along(1, first[1] + n % size), along(2, first[2] + n / size)];
-                match (finder.find([x0, y, z]), finder.find([x1, y, z])) {
-                    (Some(at), Some(last)) if last + 1 == at + size as usize => {
-                        near.extend_from_slice(&view.phi[at..=last]);
-                    }
-                    _ => {
-                        near.extend((0..size).map(|n| {
-                            finder.find([along(0, first[0] + n), y, z]).map_or(view.outside, |at| view.phi[at])
-                        }))
+            for k in z..z + size {
+                let z = along(2, k);
+                for j in y..y + size {
+                    let y = along(1, j);
+                    match if is_row { finder.find_run([x, y, z], size) } else { None } {
+                        Some(at) => near.extend_from_slice(&view.phi[at..at + size as usize]),
+                        None => near.extend(
+                            (x..x + size)
+                                .map(|x| finder.find([along(0, x), y, z]).map_or(view.outside, |at| view.phi[at])),
+                        ),
                     }
                 }
             }
@@ -131,35 +116,91 @@ impl<'a> Shares<'a> {
     }
 }
 
-/// The middles of the 2³ parts of a surface cell, x fastest.
-fn places(own: [usize; 3]) -> [Vec3; 8] {
-    std::array::from_fn(|part| {
-        [0, 1, 2].map(|axis| own[axis] as f32 + 0.5 + if part >> axis & 1 == 1 { ASIDE } else { -ASIDE })
-    })
+kernel! {
+    fn sums_of<const N: usize>(near: &[f32], heights: &[f32], fine: usize, outward: [f32; N]) -> ([f32; N], Vec3) =
+        sums_of_body;
+}
+
+/// The shares of all parts of the `fine`³ surface cells of a cell, summed up, if the surface moves outward by so many cells; of the
+/// first of them, the same times the place of each part, in surface cells. `near`: φ of these and of those around; `heights`: theirs above
+/// a solid, if there is one.
+#[inline(always)]
+fn sums_of_body<const N: usize>(near: &[f32], heights: &[f32], fine: usize, outward: [f32; N]) -> ([f32; N], Vec3) {
+    // The compiler knows where everything is in 3³ values.
+    if let (1, [], Ok(near)) = (fine, heights, <&[f32; 27]>::try_from(near)) {
+        return sums_of_cells(near, &[], 1, outward);
+    }
+    sums_of_cells(near, heights, fine, outward)
+}
+
+#[inline(always)]
+fn sums_of_cells<const N: usize>(near: &[f32], heights: &[f32], fine: usize, outward: [f32; N]) -> ([f32; N], Vec3) {
+    let (unit, size) = (fine as f32, fine + 2);
+    let (mut sums, mut moment) = ([0.0; N], [0.0; 3]);
+    for n in 0..fine * fine * fine {
+        let own = [n % fine, n / fine % fine, n / fine / fine];
+        let [x, y, z] = own.map(|along| along + 1);
+        let (at, steps) = (x + size * (y + size * z), [1, size, size * size]);
+        let phi = parts(near, at, steps);
+        let (covered, out) = if heights.is_empty() { ([0.0; 8], [0.0; 3]) } else { covered(heights, at, steps) };
+        let aligned = if heights.is_empty() { 0.0 } else { cosine(slope(&phi), out) };
+        for n in 0..N {
+            let mut shares = [0.0; 8];
+            for part in 0..8 {
+                let below = share_below(phi[part] - unit * outward[n]);
+                shares[part] = share_of_both(below, 1.0 - covered[part], aligned);
+            }
+            let sum = sum(shares);
+            sums[n] += sum;
+            if n == 0 {
+                for axis in 0..3 {
+                    moment[axis] += (own[axis] as f32 + 0.5) * sum + ASIDE * rise_along(&shares, axis);
+                }
+            }
+        }
+    }
+    (sums, moment)
+}
+
+/// The sum of a value of each of 2³ parts.
+#[inline(always)]
+fn sum([a, b, c, d, e, f, g, h]: [f32; 8]) -> f32 {
+    ((a + e) + (b + f)) + ((c + g) + (d + h))
+}
+
+/// The sum of the values of the parts above along an axis, less that of those below.
+#[inline(always)]
+fn rise_along(of: &[f32; 8], axis: usize) -> f32 {
+    let mut signed = *of;
+    for part in 0..8 {
+        signed[part] = if part >> axis & 1 == 1 { of[part] } else { -of[part] };
+    }
+    sum(signed)
 }
 
 /// The share of a part of a surface cell that is below a surface, at this distance from its middle in surface cells.
+#[inline(always)]
 fn share_below(distance: f32) -> f32 {
     (0.5 - 2.0 * distance).clamp(0.0, 1.0)
 }
 
 /// The share of a part of a surface cell that is `below` a surface and `free` of a solid, where these are the shares of each alone.
 /// `aligned`: the cosine of the angle between their ways out, 1 in a film on the solid.
+#[inline(always)]
 fn share_of_both(below: f32, free: f32, aligned: f32) -> f32 {
-    if free == 1.0 {
-        return below;
-    }
     let product = below * free;
     let extreme = if aligned > 0.0 { (below + free - 1.0).max(0.0) } else { below.min(free) };
     product + aligned.abs() * (extreme - product)
 }
 
 /// The mean slope over a surface cell of a field with these values in its parts.
+#[inline(always)]
 fn slope(of: &[f32; 8]) -> Vec3 {
-    [0, 1, 2].map(|axis| 0.5 * (0..8).map(|k| if k >> axis & 1 == 1 { of[k] } else { -of[k] }).sum::<f32>())
+    [0, 1, 2].map(|axis| 0.5 * rise_along(of, axis))
 }
 
 /// The cosine of the angle between two slopes.
+#[inline(always)]
 fn cosine(a: Vec3, b: Vec3) -> f32 {
     let lengths = length(a) * length(b);
     if lengths > 0.0 { (dot(a, b) / lengths).clamp(-1.0, 1.0) } else { 0.0 }
@@ -167,6 +208,7 @@ fn cosine(a: Vec3, b: Vec3) -> f32 {
 
 /// φ in the middle of the 2³ parts of a surface cell, x fastest. `at`: where it is in `phi`; `steps`: how far from there those beside it
 /// are, along each axis.
+#[inline(always)]
 fn parts(phi: &[f32], at: usize, steps: [usize; 3]) -> [f32; 8] {
     // Linear interpolation is too high where φ is curved, by ½ t (1 − t) φ″ along each axis: by 3/32 φ″ here. That the share of a part
     // changes over half a cell along φ makes curved liquid larger by 1/96 φ″. Neither is true of a crease.
@@ -191,12 +233,14 @@ fn parts(phi: &[f32], at: usize, steps: [usize; 3]) -> [f32; 8] {
 }
 
 /// The surface cells around a part of one, which comes first; then those beside it, x fastest.
+#[inline(always)]
 fn corners(at: usize, steps: [usize; 3], part: usize) -> [usize; 8] {
     let beside = |at: usize, axis: usize| if part >> axis & 1 == 1 { at + steps[axis] } else { at - steps[axis] };
     std::array::from_fn(|k| (0..3).fold(at, |at, axis| if k >> axis & 1 == 1 { beside(at, axis) } else { at }))
 }
 
 /// How much a field with these values at the [`corners`] of a part rises there towards them, over a surface cell.
+#[inline(always)]
 fn rise(corners: &[f32; 8]) -> Vec3 {
     let weight = |k: usize, axis: usize| if k >> axis & 1 == 1 { ASIDE } else { 1.0 - ASIDE };
     [0, 1, 2].map(|axis| {
@@ -210,6 +254,7 @@ fn rise(corners: &[f32; 8]) -> Vec3 {
 
 /// The shares of the 2³ parts of a surface cell that a solid covers, x fastest, and the way out of it. `heights`: those above it, as φ
 /// of [`parts`].
+#[inline(always)]
 fn covered(heights: &[f32], at: usize, steps: [usize; 3]) -> ([f32; 8], Vec3) {
     let (mut out, own) = ([0.0; 3], parts(heights, at, steps));
     let shares = std::array::from_fn(|part| {

@@ -3,7 +3,7 @@
 use numerics::vector::{Vec3, add, length, scale, sub};
 
 use crate::level_set::{Distance, Held, PhiChange, PhiView, far_from_surface, floor, held};
-use crate::rows::{Cell, CellRows, Periods};
+use crate::rows::{Cell, CellRows, Finder, Periods};
 use crate::step::continuity::Swelling;
 use crate::step::domain::{Domain, Obstacle, Solid};
 use crate::step::exchange::{Exchange, Imposed};
@@ -111,13 +111,14 @@ impl<'a> Moving<'a> {
         move |point| scale(velocity.at(&mut sampler, periods.home_point(point)), step)
     }
 
-    /// The way, in cells, at the middle of a cell. Fast where successive cells are near each other.
+    /// The way, in cells, at the middle of a cell; 0 where no liquid comes. Fast where successive cells are near each other.
     pub(crate) fn centre_reader(&self) -> impl FnMut(Cell) -> Vec3 + use<'a> {
         let Self { velocity, step, periods, .. } = *self;
-        let (mut around, mut way) = (Around::new(velocity.rows()), self.reader());
+        let (mut around, mut way, finder) = (Around::new(velocity.rows()), self.reader(), Finder::new(velocity.rows()));
         move |cell| match if periods.any() { None } else { around.places(cell) } {
             Some(places) => scale(places.at_centre(velocity.faces()), step),
-            None => way(cell.map(|x| x as f32 + 0.5)),
+            None if periods.any() || finder.find(cell).is_some() => way(cell.map(|x| x as f32 + 0.5)),
+            None => [0.0; 3],
         }
     }
 
@@ -303,7 +304,7 @@ fn continued(
     let (steepest, own) = (STEEPEST / step, motion.velocity.faces());
     let way = mean.map_or_else(|| motion.largest_speed(), largest_of) as f32 * step;
     let reach = way.min(FARTHEST);
-    let rows = motion.rows_past_liquid(domain, layers(reach));
+    let rows = motion.rows_in_reach(domain, mean.unwrap_or(own), step, reach);
     let carried = carried.or_else(|| mean.map(|_| own.clone()));
     let nearest = Slopes::nearest(steepest);
     // What is carried becomes the liquid's where that comes to. With the nearest differences, which short substeps hardly limit,

@@ -25,7 +25,7 @@ mod tests;
 
 use std::mem::{replace, take};
 
-use numerics::vector::{Vec3, scale};
+use numerics::vector::{Vec3, length, scale, sub};
 use serde::{Deserialize, Serialize};
 
 use crate::carried::{MaterialPoints, PhaseShares};
@@ -168,6 +168,8 @@ pub struct VolumeTargets {
     changes: Vec<Change>,
     /// What moving surfaces has added so far, m³.
     corrected: f64,
+    /// How much the volume of the largest piece changed ÷ area · way when last much of it was wrong: less says little.
+    response: f64,
 }
 
 impl VolumeTargets {
@@ -191,7 +193,7 @@ impl VolumeTargets {
         let now = marked(surface, &found);
         surface.markers_mut().set_pieces(now);
         let (pieces, cells, changes) = (Vec::new(), PieceCells::default(), Vec::new());
-        let mut targets = Self { cell, pieces, cells, changes, corrected: 0.0 };
+        let mut targets = Self { cell, pieces, cells, changes, corrected: 0.0, response: 1.0 };
         let unit = targets.unit(surface);
         let is_off = |seen: f64, known: f64| (unit * seen / known - 1.0).abs() > ROUNDED;
         let known: Vec<Option<f64>> = known_volumes(&found, parts)
@@ -271,7 +273,7 @@ impl VolumeTargets {
         let mut owed = self.given_twice(&lost);
         let (before, mut held, mut meshed) = (self.corrected, None, 0.0);
         let (mut cap, mut moved) = (0.5 * (most * size).min(OWN_CAP), 0.0);
-        let mut responses = vec![1.0; found.all.len()];
+        let mut responses = self.likely_responses();
         let mut error = f64::INFINITY;
         for pass in 0..PASSES {
             let last = replace(&mut error, self.error());
@@ -284,9 +286,15 @@ impl VolumeTargets {
                 break;
             }
             held.get_or_insert_with(|| surface.held(solid));
+            let before = take(&mut self.pieces);
+            self.pieces.clone_from(&before);
             found.shift(surface, &ways, phases);
             let (now, vanished) = self.follow(surface, solid, phases);
-            responses = now.responses(&found, &found.swept(&ways), &responses);
+            let same = same_pieces(&before, &self.pieces);
+            responses = now.responses(&found, &same, &found.swept(&ways), &responses);
+            if pass == 0 && error > SETTLED {
+                self.keep_response(&responses);
+            }
             // What vanished by a shift was not lost by the solver.
             let kept = vanished.iter().fold(0.0, |sum, piece| sum + piece.volume);
             meshed += unit * (now.volume() - found.volume()) + kept;
@@ -309,6 +317,27 @@ impl VolumeTargets {
         let corrected_now = self.corrected - before;
         let raw_drift = report.drift - share(meshed + before, report.target);
         VolumeReport { corrected_now, raw_drift, ..report }
+    }
+
+    /// How much the volume of each piece is likely to change ÷ area · way: that of the largest as in the last correction.
+    fn likely_responses(&self) -> Vec<f64> {
+        let mut responses = vec![1.0; self.pieces.len()];
+        if let Some(largest) = self.largest() {
+            responses[largest] = self.response;
+        }
+        responses
+    }
+
+    /// Keeps that of the largest for the next correction.
+    fn keep_response(&mut self, responses: &[f64]) {
+        if let Some(largest) = self.largest() {
+            self.response = responses[largest];
+        }
+    }
+
+    /// The piece with the largest target.
+    fn largest(&self) -> Option<usize> {
+        (0..self.pieces.len()).max_by(|a, b| self.pieces[*a].volume().total_cmp(&self.pieces[*b].volume()))
     }
 
     /// Exchanges what phases of a piece lack and others have too much of; whether any was.
@@ -486,6 +515,21 @@ impl VolumeTargets {
 /// The farthest that a surface is to be moved after a frame in which the fastest liquid moved `way` solver cells.
 pub fn cap(way: f64) -> f64 {
     (OF_WAY * way).clamp(CAP, FARTHEST)
+}
+
+/// For each piece the one that had exactly its target before, the closest if there are several.
+fn same_pieces(before: &[PieceTarget], now: &[PieceTarget]) -> Vec<Option<usize>> {
+    let key = |piece: &PieceTarget| piece.volume().to_bits();
+    let mut by_target: Vec<(u64, usize)> = before.iter().map(key).zip(0..).collect();
+    by_target.sort_unstable();
+    let same = |piece: &PieceTarget| {
+        let own = key(piece);
+        let first = by_target.partition_point(|(target, _)| *target < own);
+        let alike = by_target[first..].iter().take_while(|(target, _)| *target == own).map(|(_, n)| *n);
+        let away = |n: &usize| length(sub(before[*n].place, piece.place));
+        alike.min_by(|a, b| away(a).total_cmp(&away(b)))
+    };
+    now.iter().map(same).collect()
 }
 
 /// A volume ÷ the target; 0 where that is nothing.

@@ -148,22 +148,23 @@ impl Pieces {
     }
 
     /// How much the volume of each piece changed ÷ area · way, where `swept` is that product for each surface moved since
-    /// `before`. Films on solids open and close holes, and so respond more than their area says. What did not move responds as
-    /// it did.
-    pub(super) fn responses(&self, before: &Self, swept: &[f64], known: &[f64]) -> Vec<f64> {
-        let of_piece = |piece: &Measured| {
+    /// `before`, and `same` which of these it is, where its target says so. Films on solids open and close holes, and so respond more
+    /// than their area says. What did not move responds as it did.
+    pub(super) fn responses(&self, before: &Self, same: &[Option<usize>], swept: &[f64], known: &[f64]) -> Vec<f64> {
+        let change = |piece: &Measured, same: usize| piece.volume - before.all[same].volume;
+        let likely = |piece: &Measured| {
             let away = |n: &usize| length(sub(before.all[*n].place, piece.place));
             let same = (0..before.all.len()).min_by(|a, b| away(a).total_cmp(&away(b)))?;
-            let change = piece.volume - before.all[same].volume;
-            if change.abs() > SAME * piece.volume {
-                return None;
-            }
+            (change(piece, same).abs() <= SAME * piece.volume).then_some(same)
+        };
+        let of_piece = |(piece, same): (&Measured, &Option<usize>)| {
+            let same = same.or_else(|| likely(piece))?;
             match swept[same] == 0.0 {
                 true => Some(known[same]),
-                false => Some((change / swept[same]).clamp(RESPONSES[0], RESPONSES[1])),
+                false => Some((change(piece, same) / swept[same]).clamp(RESPONSES[0], RESPONSES[1])),
             }
         };
-        self.all.iter().map(|piece| of_piece(piece).unwrap_or(1.0)).collect()
+        self.all.iter().zip(same).map(|piece| of_piece(piece).unwrap_or(1.0)).collect()
     }
 
     /// The piece of a cell inside.
