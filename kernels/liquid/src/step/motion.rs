@@ -165,8 +165,8 @@ impl Motion {
         domain.clip_with_images(&self.rows().rounded_within(layers - 1, low, high), layers + 1)
     }
 
-    /// The same as far past the liquid as it comes in a substep in which it moves with a velocity, by `step` cells at 1 m/s and by
-    /// `reach` cells at most: less far where it is slow.
+    /// The rows of the velocity, and the cells around that liquid may come to in a substep: fewer where it is slow. It moves with this
+    /// velocity, `step` cells at 1 m/s, and `reach` cells at most.
     pub(super) fn rows_in_reach(&self, domain: &Domain, velocity: &FaceFields<f32>, step: f32, reach: f32) -> CellRows {
         let [low, high] = domain.reach(layers(reach) + 1);
         let past = |rows: &CellRows, reach: f32| rows.rounded_within(layers(reach) - 1, low, high);

@@ -27,7 +27,7 @@ pub(super) const NEAR: f32 = 4.0;
 /// How far, in cells, a surface swells in a region at least for another look at what it lacks.
 const WORTH_A_LOOK: f64 = 0.03;
 
-/// Share of what regions lacked before the surface last swelled, from which on they will not lack much less if it swells again.
+/// What is missing after the surface has swelled ÷ what was before, above which another look is not worth its time.
 const STUCK: f64 = 0.5;
 
 /// How far a surface swells in any region, in cells, at least: less is rounding.
@@ -192,8 +192,8 @@ impl<'a> Remainder<'a> {
     }
 
     /// How far the surface swells for what is missing; `None` where nothing is, or what is missing since it last swelled is not worth
-    /// a look: what thin sheets gain is not in proportion to how far they swell, but little where that is little. What was no less the
-    /// last time will be no less the next time, either.
+    /// a look: what thin sheets gain is not in proportion to how far they swell, but little where that is little. Nor is it where swelling
+    /// has not halved what was missing: some regions have no surface to gain by.
     fn swelling(&mut self, surface: &dyn Surface) -> Option<Swelling<'a>> {
         if self.farthest < WORTH_A_LOOK || self.is_stuck {
             return None;
